@@ -13,7 +13,7 @@ from tirelib.contact.tread import Tread
 from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.ring.ring import Ring
 from tirelib.rolling import belt, road
-from tirelib.rolling.assemble import Unknowns, matrix, residual
+from tirelib.rolling.assemble import Unknowns, changed, matrix, residual
 from tirelib.rolling.constants import Constants
 from tirelib.rolling.gage import Gage
 from tirelib.rolling.mesh import mesh
@@ -112,6 +112,19 @@ def test_the_matrix_is_the_derivative_of_the_residual(creep: float) -> None:
     np.testing.assert_allclose(
         above, differences[:, :inner], atol=1e-5 * np.abs(differences[:, :inner]).max()
     )
+
+
+@pytest.mark.parametrize("name", Constants.__slots__)
+def test_a_changed_constant_changes_the_residual_by_the_difference(name: str) -> None:
+    k, grid = ring(WHOLE), mesh()
+    found = solve(k)
+    other = k.but(**{name: 1.001 * getattr(k, name) + 1e-6})
+    there, here = residual(found.x, other, grid)[0], residual(found.x, k, grid)[0]
+    by = changed(found.x, found.z, found.contact, k, other, grid)
+    np.testing.assert_allclose(by.node, there.node - here.node, atol=1e-7)
+    np.testing.assert_allclose(by.depth, there.depth - here.depth, atol=1e-7)
+    np.testing.assert_allclose(by.rolling, there.rolling - here.rolling, atol=1e-7)
+    assert np.abs(by.node).max() + np.abs(by.depth).max() + np.abs(by.rolling).max() > 1e-9
 
 
 def test_without_shear_and_friction_it_is_the_exact_ring_of_harmonics() -> None:

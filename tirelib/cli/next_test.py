@@ -140,10 +140,9 @@ def next_test(
     from tirelib.compare.model import model_of
     from tirelib.diagnose.diagnose import diagnose, plain_tires
     from tirelib.diagnose.document import assess, diagnosis_document
-    from tirelib.diagnose.fitted import fitted_problem
     from tirelib.identify.campaign_data import straight_runs
     from tirelib.infer.select import Hypotheses
-    from tirelib.infer.strain import in_base
+    from tirelib.infer.strain import StrainProblem, in_base
     from tirelib.model.registration import registered_effects
     from tirelib.parameters import read_tire
     from tirelib.planning.document import plan_document, plan_test
@@ -212,14 +211,8 @@ def next_test(
             told = diagnosis_document(assess(found, model, progress=progress))
             suspects, hypotheses = suspects_of(told, catalogue), found.verdict.hypotheses
         elif suspects.effects:
-            problem = fitted_problem(
-                runs,
-                model.values,
-                list(catalogue.values()),
-                plain_tires(),
-                effects=effects,
-                strengths=strengths,
-                progress=progress,
+            problem = StrainProblem(
+                runs, model.values, list(catalogue.values()), effects, strengths
             )
             hypotheses = Hypotheses(problem, plain_tires(), false_alarm, progress)
         plan = plan_test(

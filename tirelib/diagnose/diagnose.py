@@ -9,7 +9,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.compare.error import Yardstick
-from tirelib.diagnose.fitted import Fitted, fitted, fitted_problem
+from tirelib.diagnose.fitted import Fitted, fitted
 from tirelib.diagnose.guess import Guess, guess_law
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import StraightRuns
@@ -145,16 +145,10 @@ def diagnose(
     ConvergenceError
         If the model cannot be fitted to the runs.
     """
-    problem = fitted_problem(
-        runs,
-        values,
-        catalogue,
-        plain_tires(),
-        effects=effects,
-        strengths=strengths,
-        progress=progress,
-    )
-    verdict = select(problem, plain_tires(), false_alarm=false_alarm, progress=progress)
+    given = StrainProblem(runs, values, catalogue, effects, strengths)
+    verdict = select(given, plain_tires(), false_alarm=false_alarm, progress=progress)
+    problem = verdict.hypotheses.problem
+    assert isinstance(problem, StrainProblem)  # noqa: S101 - as the given one
     yardstick, best = Yardstick.of(runs), verdict.best
     base = final = fitted(verdict.hypotheses, verdict.base, yardstick)
     if best is not verdict.base:

@@ -4,7 +4,7 @@ The numbers are the likeliest ones beside everything that plain tires show; the 
 is judged alone, without what plain tires show.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -16,24 +16,15 @@ from tirelib.compare.error import ModelError, Yardstick
 from tirelib.compare.model import Model
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
-from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.delay import UNIT
 from tirelib.infer.hypothesis import Hypothesis
-from tirelib.infer.plain import Family, pooled
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Point
 from tirelib.infer.select import Hypotheses
 from tirelib.infer.strain import StrainProblem
 from tirelib.model.base import move
-from tirelib.model.solution import Values
 from tirelib.rolling.solve import Rolling
 
-ROUNDS = 3
-"""Most fits of the base model until the whitening is about a model that is near."""
-FOLLOWED = 0.01
-"""Change of the waveforms, over the strain, below which the whitening need not follow a fit. On 15
-runs with a sidewall damping of .092 the fit finds .0919 +- .0008; with half of this number .0906,
-with double .0914, and the same verdict."""
 LEAST_GAIN = 0.02
 """Share of the squared error that a step towards the least error takes away, or it is the last; so
 does a new whitening about the model that was found. On 8 runs with a sidewall that softens by .3
@@ -170,7 +161,7 @@ def least_error(model: Fitted, given: Model, yardstick: Yardstick) -> tuple[Mode
                 near=found,
                 strengths=None if found else model.strengths,
                 whiten=partial(_flat, reached),
-                gain=LEAST_GAIN * reached.value**2 * yardstick.strain.size,
+                settled=LEAST_GAIN * yardstick.strain.size,
             )
             numbers = move(alone.values, found.point.base[:-1], alone.free)
             least = Model.fitted(numbers, found.effects, found.strengths)
@@ -179,49 +170,6 @@ def least_error(model: Fitted, given: Model, yardstick: Yardstick) -> tuple[Mode
             if reached.value**2 > (1.0 - LEAST_GAIN) * last.value**2:
                 break
     return before, best
-
-
-def fitted_problem(
-    runs: StraightRuns,
-    values: Values,
-    catalogue: Sequence[Effect],
-    families: Sequence[Family],
-    *,
-    effects: Sequence[Effect] = (),
-    strengths: Sequence[FloatArray] = (),
-    progress: Callable[[str], None] | None = None,
-) -> StrainProblem:
-    """Return the problem about a model fitted to straight runs.
-
-    The given model may be far from the runs, and a whitening is right nearby only.
-
-    Parameters
-    ----------
-    runs : StraightRuns
-    values : mapping
-        Of the model's tire, where the fit starts.
-    catalogue : sequence of Effect
-        That may be missing.
-    families : sequence of Family
-        Plain tires, whose smooth misfits take part in the fit.
-    effects, strengths
-        That the model has already.
-    progress : callable, optional
-
-    Raises
-    ------
-    ConvergenceError
-        If the model cannot be fitted to the runs.
-    """
-    spread, own = pooled(families), max(family.own for family in families)
-    for _ in range(ROUNDS):
-        problem = StrainProblem(runs, values, (), effects, strengths)
-        fit = posterior(problem, effects, spread, own, strengths=strengths, progress=progress)
-        values = move(problem.values, fit.point.base[:-1], problem.free)
-        strengths, change = fit.strengths, fit.solved.waveform - problem.reference.waveform
-        if np.std(change) < FOLLOWED * np.std(runs.strain):
-            break
-    return StrainProblem(runs, values, catalogue, effects, strengths)
 
 
 def _flat(error: ModelError, rows: FloatArray) -> FloatArray:

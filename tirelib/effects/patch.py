@@ -62,7 +62,12 @@ def pressed_again(state: State, loads: ComplexArray, lift: float | FloatArray = 
     old = state.contact
     extra = loads if old.extra is None else old.extra + loads
     contact = load(
-        old.compliance, old.tread, old.load - lift, extra=extra, n_nodes=old.phi.shape[1]
+        old.compliance,
+        old.tread,
+        old.load - lift,
+        extra=extra,
+        n_nodes=old.phi.shape[1],
+        start=old.start,
     )
     return state.but(contact=contact, belt=contact.displacement, deflection=contact.deflection)
 

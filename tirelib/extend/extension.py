@@ -10,7 +10,7 @@ from tirelib.arrays import FloatArray
 from tirelib.compare.error import ModelError, Yardstick
 from tirelib.compare.model import Model
 from tirelib.diagnose.diagnose import FALSE_ALARM, plain_tires
-from tirelib.diagnose.fitted import Fitted, fitted, fitted_problem, least_error
+from tirelib.diagnose.fitted import Fitted, fitted, least_error
 from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.held_out import Fold, folds, held_out
 from tirelib.effects import CATALOGUE, Effect
@@ -18,7 +18,7 @@ from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.extend.step import Step, added, removed
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.select import Hypotheses
-from tirelib.infer.strain import in_base
+from tirelib.infer.strain import StrainProblem, in_base
 from tirelib.threads import one_thread
 
 
@@ -165,15 +165,8 @@ class _Strain:
         strengths: Sequence[FloatArray],
     ) -> Fitted:
         """Return the model of a tire and effects, fitted."""
-        problem = fitted_problem(
-            self.runs,
-            values,
-            [*CATALOGUE.values(), *(e for e in self.own if e.name not in CATALOGUE)],
-            plain_tires(),
-            effects=effects,
-            strengths=strengths,
-            progress=self.progress,
-        )
+        catalogue = [*CATALOGUE.values(), *(e for e in self.own if e.name not in CATALOGUE)]
+        problem = StrainProblem(self.runs, values, catalogue, effects, strengths)
         among = Hypotheses(problem, plain_tires(), FALSE_ALARM, self.progress)
         return fitted(among, among.base, self.yardstick)
 

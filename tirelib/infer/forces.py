@@ -161,6 +161,10 @@ class ForceProblem:
             out[name] = old * float(np.exp(move)) if spec.log else old + spec.size * float(move)
         return out
 
+    def about(self, solved: ForceSolved) -> "ForceProblem":
+        """Return the problem: its whitening stays about the given model."""
+        return self
+
     def solve(self, point: Point, near: ForceSolved | None = None) -> ForceSolved:
         """Return the model at a point; raises TirelibError where it has none."""
         state = self._state(point)

@@ -112,13 +112,14 @@ def judged(
     own_effects : int
         How many of the fit's effects the model had already: they are part of it.
     """
-    nulls, plain, likelihood = _tested(problem, fit, families, 1.0)
+    views = [fit.view(problem, own) for own in OWN]
+    nulls, plain, likelihood = _tested(problem, fit, views, families, 1.0)
     null = min(nulls, key=lambda null: float(null.scores.max()))
     statistic = float(null.scores.max())
     rejected = p_value(statistic, plain)[0] <= alpha
     looseness = np.inf if rejected else 1.0
     for looser in LOOSER if rejected and fit.effects else ():
-        loose, tires, _ = _tested(problem, fit, families, looser)
+        loose, tires, _ = _tested(problem, fit, views, families, looser)
         if p_value(min(float(each.scores.max()) for each in loose), tires)[0] > alpha:
             looseness = looser
             break
@@ -136,13 +137,16 @@ def judged(
 
 
 def _tested(
-    problem: Problem, fit: Posterior, families: Sequence[Family], looser: float
+    problem: Problem,
+    fit: Posterior,
+    views: Sequence[View],
+    families: Sequence[Family],
+    looser: float,
 ) -> tuple[tuple[Null, ...], tuple[FloatArray, ...], float]:
     """Return the tests by every family, the statistics of plain tires, and the likelihood."""
     wide = fit.widths**2
     wide[len(fit.point.base) :] *= PRIOR**2
     laws = law_errors(fit, looser)
-    views = [fit.view(problem, own) for own in OWN]
     levels = [
         max(Null([view], family, {BASE: wide, **laws}).likelihood for family in families)
         for view in views

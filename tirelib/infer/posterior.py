@@ -9,8 +9,7 @@ with strengths s of the model's effects and a of all others, sigma that of plain
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,13 +24,19 @@ from tirelib.infer.problem import Point, Problem
 
 MOST_STEPS = 60
 SETTLED = 0.1
-"""Step, in posterior standard deviations, below which a fit has settled."""
-GAIN = 0.1
-"""Fall of the cost, in units of a chi-square, below which a step is the last."""
-LONGEST = 0.5
+"""Fall of the cost that a step has to promise, or a fit has settled, in units of a chi-square: as
+much as a number that moves by a third of its standard deviation. Where a model leaves more than a
+unit of each number, the unit grows with it."""
+STILL = 0.1
+"""Move of a strength of the model's effects, in standard deviations, below which it has settled."""
+LEAST_FALL = 0.1
+"""Share of what a step promises that it has to bring, or a shorter one is tried."""
+GOOD = 0.5
+"""Share below which the next step is damped."""
+FIRST = 0.1
+"""Damping to begin with, relative to the curvature by each coordinate."""
+LONGEST = 1.0
 """Longest move of a coordinate in one step."""
-SHARES = (1.0, 0.5, 0.25, 0.0)
-"""Shares of a start's strengths that are tried where the model has no solution at them."""
 HARDEST = 1e4
 """Damping at which there is no way down."""
 
@@ -94,6 +99,16 @@ class Posterior:
         pairs = zip(self.point.effects, self.point.strengths, strict=True)
         return next((strength for effect, strength in pairs if effect.name == name), None)
 
+    def slopes_at(self, point: Point) -> FloatArray:
+        """Return the slopes of this fit by the coordinates of a point with the same effects."""
+        base, first = len(self.point.base), len(self.point.base)
+        by = {}
+        for effect in self.effects:
+            by[effect.name] = self.rows[BASE][first : first + effect.components]
+            first += effect.components
+        by |= {effect.name: self.rows[effect.name] for effect in self.point.effects[self.count :]}
+        return np.concatenate([self.rows[BASE][:base], *(by[e.name] for e in point.effects)])
+
     def view(self, problem: Problem, own: float) -> View:
         """Return the normal equations for one size of the misfit that each run has for itself."""
         whiten = problem.whitener(own)
@@ -121,7 +136,7 @@ def posterior(
     near: Posterior | None = None,
     strengths: Sequence[FloatArray] | None = None,
     whiten: Callable[[FloatArray], FloatArray] | None = None,
-    gain: float = GAIN,
+    settled: float = SETTLED,
     progress: Callable[[str], None] | None = None,
 ) -> Posterior:
     """Fit the model with effects.
@@ -143,8 +158,8 @@ def posterior(
         From where the strengths start.
     whiten : callable, optional
         Turns rows (k, ...) into whitened ones (k, n); the problem's whitening by default.
-    gain : float
-        Fall of the cost below which a step is the last.
+    settled : float
+        Fall of the cost that a step has to promise.
     progress : callable, optional
 
     Raises
@@ -160,14 +175,17 @@ def posterior(
     widths += [np.full(e.components, np.sqrt(max(spread.get(e.name, 0.0), LEAST))) for e in others]
     width = np.concatenate(widths)
     low, high = _ends(others, len(width))
-    point, solved = _solvable(problem, point, near)
-    slopes = problem.slopes(point, solved)
+    solved = problem.solve(point, near.solved if near else None)
+    known = None if near is None or strengths is not None else near.slopes_at(point)
+    slopes = problem.slopes(point, solved) if known is None else known
+    exact = known is None or (near is not None and near.point.effects == point.effects)
     shapes = problem.remainder(point, solved)
     white = whiten(np.concatenate(list(shapes.values())))
     ends = np.cumsum([len(rows) for rows in shapes.values()])[:-1]
     whitened = dict(zip(shapes, np.split(white, ends), strict=True))
     rest = whiten(solved.rest)
-    damping, moved = 1e-3, np.inf
+    asked = slice(len(point.base), len(width) - sum(e.components for e in others))
+    damping = 0.0
     for _ in range(MOST_STEPS):
         white_slopes = whiten(slopes)
         rows = np.concatenate([white_slopes, white])
@@ -179,36 +197,43 @@ def posterior(
         gradient = metric.right(normal.right)[block] - here / width**2
         cost = _cost(metric, normal.right, normal.square, here, width)
         deviation = np.sqrt(np.diag(np.linalg.inv(gram)))
-        after, trial = np.inf, None
-        while damping < HARDEST:
-            dz = _step(gram + damping * np.diag(np.diag(gram)), gradient, low - here, high - here)
-            dz = dz * min(1.0, LONGEST / float(np.abs(dz).max()))
-            moved = float(np.abs(dz / deviation).max())
-            trial = _tried(problem, point, dz, solved)
-            if trial is not None:
-                left = whiten(trial[1].rest)
+        within = low - here, high - here
+        trial, dz = None, _step(gram, gradient, *within)
+        promised = _fall(gram, gradient, dz)
+        there = promised < settled * max(1.0, cost / rest.size)
+        there = there and bool((np.abs(dz[asked]) < STILL * deviation[asked]).all())
+        while not there and damping < HARDEST:
+            dz = _step(gram + damping * np.diag(np.diag(gram)), gradient, *within)
+            share = min(1.0, LONGEST / float(np.abs(dz).max()))
+            tried = _tried(problem, point, share * dz, solved)
+            if tried is not None:
+                left = whiten(tried[1].rest)
                 after = _cost(
-                    metric, rows @ left, float(left @ left), coordinates_of(trial[0]), width
+                    metric, rows @ left, float(left @ left), coordinates_of(tried[0]), width
                 )
-                if after < cost + GAIN:
+                brought = (cost - after) / (share * _fall(gram, gradient, dz))
+                if brought > LEAST_FALL:
+                    trial = tried
                     break
-            damping = max(10.0 * damping, 1e-2)
-        if trial is None or after >= cost + GAIN:
-            break  # no way down: the bottom, or its edge
+            damping = max(10.0 * damping, FIRST)
+        if trial is None:
+            # the bottom, or its edge: slopes of a point nearby do not tell
+            if exact:
+                break
+            slopes, exact, damping = problem.slopes(point, solved), True, 0.0
+            continue
         (point, solved), rest = trial, left
-        damping = max(0.1 * damping, 1e-9)
+        damping = max(damping, FIRST) if brought < GOOD else 0.1 * damping
         if progress is not None:
             progress(f"fit of {', '.join(e.name for e in effects) or 'the base'}, cost {after:.0f}")
-        if moved < SETTLED or cost - after < gain:
-            break
-        slopes = problem.slopes(point, solved, near=True)
+        slopes, exact = problem.slopes(point, solved, near=True), False
     else:
         raise ConvergenceError(
-            f"fit with {', '.join(e.name for e in effects) or 'no effect'}: the parameters still "
-            f"move by {moved:.2g} standard deviations; the model does not fit these runs: look at "
-            "them with `tirelib compare`",
+            f"fit with {', '.join(e.name for e in effects) or 'no effect'}: after {MOST_STEPS} "
+            f"steps the cost still falls by {promised:.2g}; the model does not fit these runs: "
+            "look at them with `tirelib compare`",
             point,
-            moved,
+            promised,
         )
     every, slopes = explaining(problem, point, solved, len(effects))
     count = len(every[BASE])
@@ -225,7 +250,7 @@ def posterior(
         every,
         width[:count],
         covariance,
-        after if np.isfinite(after) else cost,
+        cost,
     )
 
 
@@ -266,21 +291,6 @@ def _start(
     return Point(base, tuple(effects), tuple(np.array(s, dtype=float) for s in given))
 
 
-def _solvable(problem: Problem, point: Point, near: Posterior | None) -> tuple[Point, Any]:
-    """Return a point with its solution, its strengths nearer to those known where it has none."""
-    start = near.solved if near else None
-    known = [None if near is None else near.strength(e.name) for e in point.effects]
-    for share in SHARES:
-        strengths = tuple(
-            share * s + (0.0 if k is None else (1.0 - share) * k)
-            for s, k in zip(point.strengths, known, strict=True)
-        )
-        trial = replace(point, strengths=strengths)
-        with suppress(TirelibError):
-            return trial, problem.solve(trial, start)
-    return trial, problem.solve(trial, start)
-
-
 def coordinates_of(point: Point) -> FloatArray:
     """Return the base's coordinates and the strengths in ranges, (n_coordinates,)."""
     ranges = [s / e.scale for e, s in zip(point.effects, point.strengths, strict=True)]
@@ -307,6 +317,11 @@ def _step(gram: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatAr
     target = np.linalg.solve(lower, gradient)
     ends = (np.minimum(low, 0.0), np.maximum(high, 1e-12))
     return np.asarray(optimize.lsq_linear(lower.T, target, ends, method="bvls").x)
+
+
+def _fall(gram: FloatArray, gradient: FloatArray, dz: FloatArray) -> float:
+    """Return by how much a step lowers a quadratic cost."""
+    return float(2.0 * gradient @ dz - dz @ gram @ dz)
 
 
 def _tried(problem: Problem, point: Point, dz: FloatArray, solved: Any) -> tuple[Point, Any] | None:

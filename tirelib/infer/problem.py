@@ -79,13 +79,16 @@ class Problem(Protocol):
         `own` is the size of the misfit that each run has for itself.
         """
 
+    def about(self, solved: Any) -> "Problem":
+        """Return the problem with its whitening about a solution; itself where it is."""
+
     def solve(self, point: Point, near: Any = None) -> Solved:
         """Return the model at a point; raises TirelibError where it has none."""
 
     def slopes(self, point: Point, solved: Any, *, near: bool = False) -> FloatArray:
         """Return slopes by the base, then by strengths in ranges, (n_coordinates, ...).
 
-        With `near`, those by strengths may be of a point nearby, to save time.
+        With `near`, those that cost much may be of a point nearby.
         """
 
     def remainder(self, point: Point, solved: Any) -> Mapping[str, FloatArray]:

@@ -15,17 +15,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
 from tirelib.errors import ParameterError, TirelibError
 from tirelib.infer.hypothesis import Hypothesis, judged
-from tirelib.infer.normal import Weighed
-from tirelib.infer.plain import BASE, Family, pooled
-from tirelib.infer.posterior import Posterior, posterior
+from tirelib.infer.plain import Family, pooled
+from tirelib.infer.posterior import SETTLED, Posterior, posterior
 from tirelib.infer.problem import Problem
 
 SINGLES, PARTNERS, LEADERS = 6, 3, 2
 """Hypotheses that are fitted exactly: single effects, partners of each leader, and leaders."""
+ROUNDS = 5
+"""Most times that the whitening follows the fit without further effects."""
+ROUGH = 5.0
+"""Fall of the cost that a step has to promise on the way there, in units of a chi-square."""
 MOST = 3
 """Effects of a hypothesis at most."""
 
@@ -81,6 +83,8 @@ class Hypotheses:
 
     Attributes
     ----------
+    problem : Problem
+        The given one, its whitening about the model without further effects.
     base : Hypothesis
         No further effect.
     effects : mapping of name to Effect
@@ -105,15 +109,21 @@ class Hypotheses:
                 f"false-alarm probability {false_alarm:g}: with {min(map(len, families))} plain "
                 f"tires of a family the least that can be had is {least:.3g}; give a larger one"
             )
-        self.problem, self.families = problem, tuple(families)
+        self.families = tuple(families)
         self.false_alarm, self.progress = false_alarm, progress
         self.spread = pooled(families)
         self.own = max(family.own for family in families)
         self.had = problem.start.effects
         self.effects = {effect.name: effect for effect in problem.living}
-        self.base = self._tested(
-            posterior(problem, self.had, self.spread, self.own, strengths=problem.start.strengths)
-        )
+        fit = self._fitted(problem, None, ROUGH)
+        for _ in range(ROUNDS):
+            # a whitening is right nearby only
+            nearer = problem.about(fit.solved)
+            if nearer is problem:
+                break
+            problem, fit = nearer, self._fitted(nearer, fit, ROUGH)
+        self.problem = problem
+        self.base = self._tested(self._fitted(problem, fit, SETTLED))
         self._made: dict[frozenset[str], Hypothesis | None] = {frozenset(): self.base}
 
     def at(self, names: Sequence[str], near: Hypothesis | None = None) -> Hypothesis | None:
@@ -132,7 +142,6 @@ class Hypotheses:
                     self.spread,
                     self.own,
                     near=near.fit,
-                    strengths=_start(self.problem, near, more, self.own, self.spread),
                     progress=self.progress,
                 )
                 self._made[key] = self._tested(fit)
@@ -149,6 +158,19 @@ class Hypotheses:
         """All hypotheses with further effects that were fitted."""
         made = (each for key, each in self._made.items() if key)
         return tuple(each for each in made if each is not None)
+
+    def _fitted(self, problem: Problem, near: Posterior | None, settled: float) -> Posterior:
+        """Return the fit without further effects."""
+        return posterior(
+            problem,
+            self.had,
+            self.spread,
+            self.own,
+            near=near,
+            strengths=None if near else problem.start.strengths,
+            settled=settled,
+            progress=self.progress,
+        )
 
     def _tested(self, fit: Posterior) -> Hypothesis:
         had = len(self.had)
@@ -206,26 +228,3 @@ def _further(leader: Hypothesis, effects: dict[str, Effect], most: int) -> list[
     least = sorted(names, key=lambda name: left[name])[:most]
     first = max(names, key=lambda name: scores[name], default="")
     return least if first in least or not first else [first, *least[: most - 1]]
-
-
-def _start(
-    problem: Problem,
-    near: Hypothesis,
-    more: Sequence[Effect],
-    own: float,
-    spread: dict[str, float],
-) -> list[FloatArray]:
-    """Return strengths to start from: those of the fit nearby, first order for what is new."""
-    known = dict(zip(near.names, near.fit.strengths, strict=True))
-    normal = near.fit.view(problem, own).normal
-    wide = {e.name: 1.0 for e in more if e.name not in known}
-    diagonal = normal.spread({**spread, BASE: near.fit.widths**2, **wide})
-    mean = Weighed(normal, diagonal).mean(normal.right)
-    out = list(near.fit.strengths[: len(problem.start.strengths)])
-    for effect in more:
-        if effect.name in known:
-            out.append(known[effect.name])
-        else:
-            first = mean[normal.blocks[effect.name]] * effect.scale
-            out.append(np.clip(first, 0.9 * effect.low, 0.9 * effect.high))
-    return out

@@ -28,8 +28,13 @@ from tirelib.infer.whiten import INSIDE, Whitener
 from tirelib.model import solution
 from tirelib.model.base import coordinates, move
 from tirelib.model.chain import Changes
-from tirelib.model.rolled import RolledSlopes
-from tirelib.model.solution import Solution, added_by_values, by_effects, by_values
+from tirelib.model.solution import (
+    Solution,
+    SolutionSlopes,
+    added_by_values,
+    by_effects,
+    by_values,
+)
 from tirelib.model.state import Operating
 from tirelib.rolling.assemble import Unknowns
 from tirelib.rolling.solve import Rolling
@@ -70,10 +75,14 @@ OWN = 0.004
 LEAST_SIGNAL = 3.0
 """Whitened norm below which an effect at the end of its range is dead."""
 LEAST_STEP = 1e-3
-NEAR = 0.2
+NEAR = 0.05
 """Move of a strength, in ranges, within which what it adds to the slopes is kept."""
-NEAR_BASE = 0.1
+NEAR_BASE = 0.03
 """The same of the base's coordinates."""
+FOLLOWED = 0.003
+"""Change of the waveforms, over the strain, below which a whitening need not follow a fit. A base
+that lacks an effect is then as likely from any start: with a stiffness a quarter off, its cost is
+4626, 4623 and 4661; with .01 it is 4626, 4474 and 5026."""
 UNKNOWN_NOISE = 0.005
 """Noise over the rms strain where there are no repeats."""
 
@@ -101,14 +110,49 @@ class StrainSolved:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Reference:
+    """What a whitening and the contact's lengths are about.
+
+    Attributes
+    ----------
+    waveform : shape (n_runs, n_phi)
+    tangent : shape (n_runs, n_phi, 4)
+        Its slopes by load, pressure, gain and angle.
+    half_angle : shape (n_runs,), [rad]
+        Of the contact.
+    point : Point
+    rolling : Rolling
+        A start of solutions nearby.
+    """
+
+    waveform: FloatArray
+    tangent: FloatArray
+    half_angle: FloatArray
+    point: Point
+    rolling: Rolling
+
+    def take(self, chosen: BoolArray) -> "Reference":
+        """Return that of some of the runs."""
+        return Reference(
+            self.waveform[chosen],
+            self.tangent[chosen],
+            self.half_angle[chosen],
+            self.point,
+            self.rolling.take(chosen),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Added:
     """Slopes that cost much, and the point they were taken at."""
 
     point: Point
     slopes: FloatArray
 
-    def serves(self, point: Point) -> bool:
-        """Return whether a point is so near that these slopes do."""
+    def serves(self, point: Point, *, near: bool) -> bool:
+        """Return whether these slopes are a point's own, or with `near` so near that they do."""
+        if self.point is point or not near:
+            return self.point is point
         same = self.point.effects == point.effects
         near = float(np.abs(self.point.base - point.base).max()) < NEAR_BASE
         return (
@@ -152,25 +196,38 @@ class StrainProblem:
         self.dead: dict[str, str] = {}
         typical = float(np.sqrt(np.mean(runs.strain**2)))
         noise = runs.noise.std if runs.noise.known else UNKNOWN_NOISE * typical
-        self._last: tuple[StrainSolved, RolledSlopes] | None = None
+        self._last: tuple[StrainSolved, SolutionSlopes] | None = None
         self._added: _Added | None = None
         self._strengths: _Added | None = None
         self.noise = np.full(len(self.data.points), noise)
         self.present = len(self.data.points)  # runs that are measured: the first ones
         self._scale = scales(self.data.tolerance, self.data.angle_std)
-        self._refer()
-        self.living = self._alive(catalogue)
-
-    def _refer(self) -> None:
-        """Take the model as it is as the reference of contact lengths and of the whitening."""
-        solved = self.solve(self.start)
-        self.half_angle = 0.6 * np.sqrt(
-            2.0 * solved.model.deflection / float(np.max(self.values["free_radius"]))
-        )
-        self.reference = solved
-        slopes = by_values(solved.model, self.free)
-        self._tangent = tangents(solved.waveform, slopes.waveform[-2], slopes.waveform[-1])
         self._whiteners: dict[float, Whitener] = {}
+        solved = self._solved(self.start, None)
+        self.reference = self._referred(solved)
+        self.living = self._alive(solved, catalogue)
+
+    @property
+    def half_angle(self) -> FloatArray:
+        """Half angle of the contact, (n_runs,), [rad]."""
+        return self.reference.half_angle
+
+    def _referred(self, solved: StrainSolved) -> Reference:
+        """Return a solution as a reference."""
+        model, wave = solved.model, solved.waveform
+        radius = float(np.max(self.values["free_radius"]))
+        by = by_values(model, ()).waveform
+        half = 0.6 * np.sqrt(2.0 * model.deflection / radius)
+        return Reference(wave, tangents(wave, by[0], by[1]), half, solved.point, model.rolling)
+
+    def about(self, solved: StrainSolved) -> "StrainProblem":
+        """Return the problem with a whitening about a solution; itself where it is near."""
+        change = solved.waveform - self.reference.waveform
+        if np.std(change) < FOLLOWED * np.std(self.data.strain):
+            return self
+        out = copy(self)
+        out.reference, out._whiteners = self._referred(solved), {}
+        return out
 
     def followed_by(self, points: Operating, repeats: FloatArray) -> "StrainProblem":
         """Return the problem with runs ahead, whose strain is zero, behind the present ones.
@@ -201,7 +258,8 @@ class StrainProblem:
         ahead = scales(data.tolerance, out.data.angle_std[-n:]) * share[:, None]
         out._scale = np.concatenate([self._scale, ahead])
         out.forget()
-        out._refer()
+        out._whiteners = {}
+        out.reference = out._referred(out._solved(self.reference.point, None))
         return out
 
     def part(self, chosen: BoolArray, start: Point) -> "StrainProblem":
@@ -209,8 +267,9 @@ class StrainProblem:
 
         Parameters
         ----------
+        chosen : shape (n_runs,)
         start : Point
-            The model that its whitening is about.
+            The model.
         """
         data, out = self.data, copy(self)
         out.data = replace(
@@ -223,7 +282,7 @@ class StrainProblem:
         out.noise, out._scale = self.noise[chosen], self._scale[chosen]
         out.start, out.living, out.present = start, (), int(chosen.sum())
         out.forget()
-        out._refer()
+        out.reference, out._whiteners = self.reference.take(chosen), {}
         return out
 
     @property
@@ -244,7 +303,7 @@ class StrainProblem:
         if own not in self._whiteners:
             self._whiteners[own] = Whitener.of(
                 self.reference.waveform,
-                self._tangent,
+                self.reference.tangent,
                 self._scale,
                 self.half_angle,
                 self.data.points,
@@ -264,7 +323,11 @@ class StrainProblem:
 
     def solve(self, point: Point, near: StrainSolved | None = None) -> StrainSolved:
         """Return the model at a point; raises TirelibError where it has none."""
-        model = self.model_at(point, self.data.points, self._guess(point, near))
+        return self._solved(point, self._guess(point, near))
+
+    def _solved(self, point: Point, start: Rolling | Unknowns | None) -> StrainSolved:
+        """Return the model at a point from a start of the contact."""
+        model = self.model_at(point, self.data.points, start)
         delay = UNIT * float(point.base[-1])
         waveform = earlier(model.waveform, self.data.points.omega, -delay)
         return StrainSolved(self.data.strain - waveform, point, model, delay, waveform)
@@ -278,25 +341,25 @@ class StrainProblem:
             values, points, _changes(point), low_pass=self.data.low_pass, start=start
         )
 
-    def _guess(self, point: Point, near: StrainSolved | None) -> Rolling | Unknowns | None:
+    def _guess(self, point: Point, near: StrainSolved | None) -> Rolling | Unknowns:
         """Return a start of the contact: a solution nearby, moved along its slopes if known."""
         if near is None:
-            return None
+            return self.reference.rolling
         if self._last is None or self._last[0] is not near:
             return near.model.rolling
-        return self._last[1].start(near.model.rolling, (point.base - near.point.base)[:-1])
+        return self._last[1].start(near.model, (point.base - near.point.base)[:-1])
 
     def slopes(self, point: Point, solved: StrainSolved, *, near: bool = False) -> FloatArray:
         """Return slopes by the base, the delay and strengths in ranges.
 
-        With `near`, slopes by strengths may be those of a point nearby: they cost most.
+        With `near`, slopes by strengths, and of what they add to the base, may be those of a point
+        nearby: they cost most.
         """
-        by = by_values(solved.model, self.free)
-        assert by.rolled is not None  # noqa: S101 - values move the rolling ring
-        self._last = (solved, by.rolled)
-        slopes = by.waveform[: len(self.free)]
+        if self._last is None or self._last[0] is not solved:
+            self._last = (solved, by_values(solved.model, self.free))
+        slopes = self._last[1].waveform[: len(self.free)]
         if self._bends(point):
-            if self._added is None or not self._added.serves(point):
+            if self._added is None or not self._added.serves(point, near=near):
                 more = added_by_values(solved.model, self.free, LEAST_STEP)
                 self._added = _Added(point, more)
             slopes = slopes + self._added.slopes
@@ -307,7 +370,7 @@ class StrainProblem:
 
     def _by_strengths(self, point: Point, solved: StrainSolved, *, near: bool) -> FloatArray:
         """Return slopes by strengths in ranges, without the delay."""
-        if near and self._strengths is not None and self._strengths.serves(point):
+        if self._strengths is not None and self._strengths.serves(point, near=near):
             return self._strengths.slopes
         there, steps = [], []
         for k, effect in enumerate(point.effects):
@@ -387,10 +450,10 @@ class StrainProblem:
         gain = np.exp(-0.5 * (self.half_angle[:, None] * order) ** 2)
         return np.asarray(np.maximum(np.fft.irfft(np.fft.rfft(square) * gain, n=GRID.size), 0.0))
 
-    def _alive(self, catalogue: Sequence[Effect]) -> tuple[Effect, ...]:
+    def _alive(self, solved: StrainSolved, catalogue: Sequence[Effect]) -> tuple[Effect, ...]:
         """Return the effects that this plan may show; the others go to `dead`, with the reason."""
         has = {effect.name for effect in self.start.effects} | in_base(self.values)
-        solved, living = self.solve(self.start), []
+        living = []
         for effect in catalogue:
             if effect.hook == "brush" or effect.name in has:
                 continue

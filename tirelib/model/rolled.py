@@ -7,9 +7,9 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.model.state import Operating
-from tirelib.rolling.assemble import Unknowns, by_element, fields, residual
+from tirelib.rolling.assemble import Unknowns, by_element, changed, differ, fields
 from tirelib.rolling.constants import Constants
-from tirelib.rolling.gage import Gage, strain
+from tirelib.rolling.gage import Gage, same_place, strain, strain_along
 from tirelib.rolling.solve import Rolling, slopes
 
 STEP = 1e-6
@@ -17,8 +17,6 @@ STEP = 1e-6
 FRICTION = 1.0
 """Friction coefficient between tread and road. A wheel that rolls freely slides only where its
 contact ends."""
-ALONG = 1e-3
-"""Share of a slope of the solution, of which the strain's slope is taken."""
 
 Values = Mapping[str, float | FloatArray]
 
@@ -108,18 +106,14 @@ def rolled_slopes(
 
     By the implicit function theorem: the solution moves by -J^-1 dF, whatever changes F.
     """
-    at = residual(found.x, here.constants, found.mesh)[0]
-    off = [residual(found.x, each.constants, found.mesh)[0] for each in there]
+    k, x, grid = here.constants, found.x, found.mesh
+    off = [changed(x, found.z, found.contact, k, each.constants, grid) for each in there]
     steps = np.broadcast_to(np.asarray(step, dtype=float), (len(there),))
-    moved = slopes(found, [each.less(at, float(h)) for each, h in zip(off, steps, strict=True)])
-
-    def shown(z: FloatArray, made: Made) -> FloatArray:
-        return strain(z, made.constants, made.gage, found.size, n_phi)
-
-    base = shown(found.z, here)
-    rows = []
-    for each, by, h in zip(there, moved, steps, strict=True):
-        dz = ALONG * fields(by_element(by.node), found.mesh.belt)
-        along = (shown(found.z + dz, here) - shown(found.z - dz, here)) / (2.0 * ALONG)
-        rows.append(along + (shown(found.z, each) - base) / h)
-    return RolledSlopes(np.stack(rows), np.stack([by.depth for by in moved]), moved)
+    moved = slopes(found, [each.per(float(h)) for each, h in zip(off, steps, strict=True)])
+    dz = np.stack([fields(by_element(by.node), grid.belt) for by in moved])
+    rows = strain_along(found.z, dz, k, here.gage, found.size, n_phi)
+    base = strain(found.z, k, here.gage, found.size, n_phi)
+    for row, each, h in zip(rows, there, steps, strict=True):
+        if differ(k, each.constants, ("radius",)) or not same_place(here.gage, each.gage):
+            row += (strain(found.z, each.constants, each.gage, found.size, n_phi) - base) / h
+    return RolledSlopes(rows, np.stack([by.depth for by in moved]), moved)

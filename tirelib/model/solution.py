@@ -216,7 +216,7 @@ def added_by_values(found: Solution, free: Sequence[Coordinate], step: float) ->
     if found.linear is None:
         return np.zeros((len(free), 1, 1))
     own, linear = _split(found.values, found.points, found.changes)
-    here, rows = _added(found, found.values, found.points, own, linear), []
+    here, rows = _here(found, own, linear)[1], []
     for coordinate in free:
         value = np.asarray(found.values[coordinate.name], dtype=float)
         moved = {**found.values, coordinate.name: coordinate.moved(value, step)}
@@ -233,7 +233,7 @@ def slopes_of(found: Solution, free: Sequence[Coordinate] = ()) -> SolutionSlope
     p, v, step = found.points, found.values, LINEAR_STEP
     heavier = replace(p, load=p.load * (1.0 + step))
     firmer = replace(p, pressure=p.pressure * (1.0 + step))
-    here = _added(found, v, p, own, linear)
+    here = _here(found, own, linear)[1]
     rows = [(_added(found, v, at, own, linear) - here) / step for at in (heavier, firmer)]
     more = _through_gage(found, np.stack(rows))
     if free:
@@ -266,8 +266,7 @@ def by_effects(
             rolled.append(k)
             continue
         if plain is None or here is None:
-            plain = _plain(found.values, found.points, own, found.phi)
-            here = _added(found, found.values, found.points, own, linear, plain)
+            plain, here = _here(found, own, linear)
         there_too = _added(found, found.values, found.points, own_there, linear_there, plain)
         shown[k] = (there_too - here) / step
     by = None
@@ -286,6 +285,16 @@ def _plain(values: Values, points: Operating, own: Sequence[Change], phi: FloatA
     """Return the linear ring as the rolling one is: undamped, with the same constants."""
     still = {**values, "damping": 0.0}
     return pressed(State.of(still, points, phi), [("constants", change) for change in own])
+
+
+def _here(found: Solution, own: Sequence[Change], linear: Changes) -> tuple[State, FloatArray]:
+    """Return the linear ring without its changes, and what is added through it."""
+    if found.linear is not None:
+        before, after = found.linear
+        return before, after.wave - before.wave
+    plain = _plain(found.values, found.points, own, found.phi)
+    plain = strained(plain, (), found.low_pass)
+    return plain, _added(found, found.values, found.points, own, linear, plain)
 
 
 def _added(
@@ -314,12 +323,13 @@ def _beside(
     low_pass: LowPass,
     plain: State,
 ) -> tuple[State, State]:
-    """Return the filtered linear ring without and with its changes; `plain` is pressed."""
+    """Return the filtered linear ring without and with its changes; `plain` is pressed or both."""
+    before = strained(plain, (), low_pass) if plain.waveform is None else plain
     with_them = plain
     if _damped(values) or any(stage == "constants" for stage, _ in linear):
         every = [*(("constants", change) for change in own), *linear]
         with_them = pressed(State.of(values, points, plain.phi), every)
-    return strained(plain, (), low_pass), strained(with_them, linear, low_pass)
+    return before, strained(with_them, linear, low_pass)
 
 
 def _at_gage(found: Solution, shown: FloatArray, changes: Changes) -> FloatArray:

@@ -12,12 +12,12 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.diagnose import FALSE_ALARM, plain_tires, twins_of
-from tirelib.diagnose.fitted import fitted_problem
 from tirelib.effects import Effect
 from tirelib.errors import ParameterError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.chance import Plans
 from tirelib.infer.select import Hypotheses
+from tirelib.infer.strain import StrainProblem
 from tirelib.threads import one_thread
 
 RATIOS = (1.05, 1.2, 1.5)
@@ -155,10 +155,10 @@ def selftest(
             f"selftest: {repeats} tires are asked for each planting; the library has {most}: give "
             "a smaller --repeats"
         )
-    problem = fitted_problem(
-        runs, values, catalogue, families, effects=effects, strengths=strengths, progress=progress
-    )
-    base = Hypotheses(problem, families, false_alarm, progress).base
+    given = StrainProblem(runs, values, catalogue, effects, strengths)
+    among = Hypotheses(given, families, false_alarm, progress)
+    problem, base = among.problem, among.base
+    assert isinstance(problem, StrainProblem)  # noqa: S101 - as the given one
     plans = Plans(problem, base, false_alarm, repeats, seed)
     plantings = []
     for effect in problem.living:

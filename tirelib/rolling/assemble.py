@@ -6,6 +6,7 @@ band matrix. The equations are the virtual work of u, v and psi, the bristles' l
 load and the wheel's torque.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -25,6 +26,8 @@ BORDER = WIDTH + 2
 BAND = LOCAL - 1
 """Diagonals on either side."""
 Q = 3
+ROAD = tuple(name for name in Constants.__slots__ if name == "radius" or name not in belt.CONSTANTS)
+"""Constants that the contact is made of."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,13 +46,9 @@ class Unknowns:
             self.rolling + share * other.rolling,
         )
 
-    def less(self, other: "Unknowns", step: float) -> "Unknowns":
-        """Return the difference to the other, per step."""
-        return Unknowns(
-            (self.node - other.node) / step,
-            (self.depth - other.depth) / step,
-            (self.rolling - other.rolling) / step,
-        )
+    def per(self, step: float) -> "Unknowns":
+        """Return a difference per step."""
+        return Unknowns(self.node / step, self.depth / step, self.rolling / step)
 
     def take(self, index: Any) -> "Unknowns":
         """Return some points."""
@@ -161,26 +160,72 @@ def residual(x: Unknowns, k: Constants, mesh: Mesh) -> tuple[Unknowns, FloatArra
     """Return the equations' residual, the element fields and the contact."""
     local = by_element(x.node)
     z = fields(local, mesh.belt)
+    c = contact(x, local, k, mesh)
+    out, road = _of_belt(z, k, mesh), _of_road(x, c, k, mesh)
+    out[:, mesh.fine] += road.element
+    law = local[..., 1:, Q].copy()
+    law[:, mesh.fine] -= c.q
+    out[..., 1:, Q] = law
+    return Unknowns(gathered(out), road.load, road.torque), z, c
+
+
+def changed(
+    x: Unknowns, z: FloatArray, c: Contact, k: Constants, other: Constants, mesh: Mesh
+) -> Unknowns:
+    """Return the residual with other constants less that with k, whose fields and contact are z, c.
+
+    What is made of the same constants is not computed again.
+    """
+    out = np.zeros((*z.shape[1:3], 4, WIDTH))
+    load = torque = np.zeros(len(k))
+    if differ(k, other, belt.CONSTANTS):
+        out += _of_belt(z, other, mesh) - _of_belt(z, k, mesh)
+    if differ(k, other, ROAD):
+        there = contact(x, by_element(x.node), other, mesh)
+        old, new = _of_road(x, c, k, mesh), _of_road(x, there, other, mesh)
+        out[:, mesh.fine] += new.element - old.element
+        out[:, mesh.fine, 1:, Q] -= there.q - c.q
+        load, torque = new.load - old.load, new.torque - old.torque
+    return Unknowns(gathered(out), load, torque)
+
+
+def differ(k: Constants, other: Constants, names: Sequence[str]) -> bool:
+    """Return whether any of these constants differs."""
+    return not all(np.array_equal(getattr(k, name), getattr(other, name)) for name in names)
+
+
+def _of_belt(z: FloatArray, k: Constants, mesh: Mesh) -> FloatArray:
+    """Return the work of belt and sidewall, (n_points, n_elements, 4, WIDTH)."""
     work = belt.forces(z, k) * mesh.belt.weight
-    out = np.zeros(local.shape)
+    out = np.zeros((*z.shape[1:3], 4, WIDTH))
     for f in range(3):
         out[..., f] = (
             work[f] @ mesh.belt.value + (work[3 + f][:, :, None] @ mesh.belt.slope)[:, :, 0]
         )
-    c = contact(x, local, k, mesh)
+    return out
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Road:
+    """The road's work (n_points, n_fine, 4, WIDTH), and what load and torque lack."""
+
+    element: FloatArray
+    load: FloatArray
+    torque: FloatArray
+
+
+def _of_road(x: Unknowns, c: Contact, k: Constants, mesh: Mesh) -> _Road:
     area = k.radius[:, None, None] * mesh.road.weight
+    out = np.zeros((*c.delta.shape[:2], 4, WIDTH))
     for f in range(3):
         pull = area * (c.pressure * c.tip.by_down[f] - c.shear * c.tip.by_along[f])
-        out[:, mesh.fine, :, f] += pull @ mesh.road.value
+        out[..., f] = pull @ mesh.road.value
     pull = area * c.pressure * c.tip.by_down[3]
-    out[:, mesh.fine, :, 2] += np.einsum("peg,egi->pei", pull, mesh.road.slope)
-    law = local[..., 1:, Q].copy()
-    law[:, mesh.fine] -= c.q
-    out[..., 1:, Q] = law
+    out[..., 2] += np.einsum("peg,egi->pei", pull, mesh.road.slope)
     load = (area * c.pressure).sum(axis=(1, 2)) - k.load
     grip = (area * (c.pressure * c.tip.along + c.shear * c.tip.arm)).sum(axis=(1, 2))
     torque = np.where(k.grips, grip + k.torque, x.rolling - k.free_radius)
-    return Unknowns(gathered(out), load, torque), z, c
+    return _Road(out, load, torque)
 
 
 def gathered(local: FloatArray) -> FloatArray:

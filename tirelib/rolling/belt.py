@@ -22,6 +22,11 @@ from tirelib.rolling.constants import Constants
 
 Fields = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
 U, V, PSI, DU, DV, DPSI = range(6)
+CONSTANTS = (
+    *("radius", "EA", "GA", "EI", "mass", "rotary_inertia", "inflation", "tension"),
+    *("k_u", "k_v", "dashpots", "omega"),
+)
+"""Constants that belt and sidewall are made of."""
 
 
 def forces(z: FloatArray, k: Constants) -> FloatArray:
@@ -109,6 +114,22 @@ def shear_angle(z: FloatArray, k: Constants) -> FloatArray:
     return out
 
 
+def gage_slopes(
+    z: FloatArray, dz: FloatArray, k: Constants, offset: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return how `strain` and `shear_angle` move as the fields (6, n_points, ...) move by dz.
+
+    Shapes (n_directions, n_points, ...), with dz of shape (n_directions, 6, n_points, ...).
+    """
+    c = _columns(k, z.ndim - 2)
+    belt, y = _Belt(z, c), np.reshape(np.asarray(offset, dtype=float), (-1, *[1] * (z.ndim - 2)))
+    da, dc, turn = dz[:, U] + dz[:, DV], dz[:, DU] - dz[:, V], dz[:, PSI]
+    along = da * belt.cos + dc * belt.sin + turn * belt.across
+    across = dc * belt.cos - da * belt.sin - turn * belt.along
+    shear = (belt.along * across - belt.across * along) / (belt.along**2 + belt.across**2)
+    return (along - y * dz[:, DPSI]) / (c["radius"] + y), shear
+
+
 class _Belt:
     """Measures and section forces; `along` = R (1 + Gamma_1), `across` = R Gamma_2."""
 
@@ -131,18 +152,4 @@ def _dashpots(c: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
 
 
 def _columns(k: Constants, more: int) -> dict[str, FloatArray]:
-    names = (
-        "radius",
-        "EA",
-        "GA",
-        "EI",
-        "mass",
-        "rotary_inertia",
-        "inflation",
-        "tension",
-        "k_u",
-        "k_v",
-        "dashpots",
-        "omega",
-    )
-    return {name: getattr(k, name).reshape(-1, *[1] * more) for name in names}
+    return {name: getattr(k, name).reshape(-1, *[1] * more) for name in CONSTANTS}

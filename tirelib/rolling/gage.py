@@ -51,6 +51,11 @@ class Gage:
     spread: FloatArray
 
 
+def same_place(a: Gage, b: Gage) -> bool:
+    """Return whether two gages sit alike."""
+    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in Gage.__slots__)
+
+
 def strain(z: FloatArray, k: Constants, gage: Gage, size: tuple[int, int], n: int) -> FloatArray:
     """Return the strain at gages over n angles from -pi, (n_points, n).
 
@@ -63,12 +68,35 @@ def strain(z: FloatArray, k: Constants, gage: Gage, size: tuple[int, int], n: in
     size : (fine, coarse)
         Of the mesh.
     """
-    rows = len(k)
-    out: FloatArray = belt.strain(z, k, gage.offset).reshape(rows, -1) @ to_grid(*size, n).T
-    if gage.liner.any():
-        turned = belt.shear_angle(z, k).reshape(rows, -1) @ to_grid_slope(*size, n).T
+    turned = belt.shear_angle(z, k) if gage.liner.any() else None
+    return _on_turn(belt.strain(z, k, gage.offset), turned, k, gage, size, n)
+
+
+def strain_along(
+    z: FloatArray, dz: FloatArray, k: Constants, gage: Gage, size: tuple[int, int], n: int
+) -> FloatArray:
+    """Return how the strain moves as the fields move, (n_directions, n_points, n).
+
+    Parameters are those of `strain`, and dz of shape (n_directions, 6, n_points, ...).
+    """
+    stretch, turned = belt.gage_slopes(z, dz, k, gage.offset)
+    return _on_turn(stretch, turned if gage.liner.any() else None, k, gage, size, n)
+
+
+def _on_turn(
+    stretch: FloatArray,
+    turned: FloatArray | None,
+    k: Constants,
+    gage: Gage,
+    size: tuple[int, int],
+    n: int,
+) -> FloatArray:
+    """Return the gage's strain for values (..., n_points, n_elements, n_gauss) at the belt."""
+    shape = stretch.shape[:-2]
+    out: FloatArray = stretch.reshape(*shape, -1) @ to_grid(*size, n).T
+    if turned is not None:
         lever = gage.liner * gage.offset / (k.radius + gage.offset)
-        out = out - lever[:, None] * turned
+        out -= lever[:, None] * (turned.reshape(*shape, -1) @ to_grid_slope(*size, n).T)
     if gage.spread.any():
         order = np.fft.rfftfreq(n, 1.0 / n)
         gain = np.exp(-0.5 * ((gage.spread / k.radius)[:, None] * order) ** 2)

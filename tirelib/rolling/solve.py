@@ -327,10 +327,12 @@ def solve_border(m: Matrix, right: FloatArray) -> FloatArray:
     """Return the solutions (n_points, n_unknowns, n_right) of the bordered band systems."""
     inner = m.band.shape[1]
     out = np.empty_like(right)
-    both = np.concatenate([m.right, right[:, :inner]], axis=2)
-    for p in range(len(both)):
+    # transposed, so that LAPACK finds every right side in one piece
+    turned = np.concatenate([m.right, right[:, :inner]], axis=2).swapaxes(1, 2).copy()
+    for p in range(len(turned)):
         lu, pivots, _ = lapack.dgbtrf(m.band[p].T, BAND, BAND, overwrite_ab=1)
-        both[p], _ = lapack.dgbtrs(lu, BAND, BAND, both[p], pivots)
+        lapack.dgbtrs(lu, BAND, BAND, turned[p].T, pivots, overwrite_b=1)
+    both = turned.swapaxes(1, 2)
     corner = m.corner - m.lower @ both[..., :BORDER]
     rest = right[:, inner:] - m.lower @ both[..., BORDER:]
     try:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,14 +14,15 @@ from tirelib.arrays import FloatArray
 from tirelib.compare.error import Yardstick, error_of
 from tirelib.compare.model import model_of
 from tirelib.diagnose.diagnose import plain_tires
-from tirelib.diagnose.fitted import Fitted, fitted, fitted_problem, least_error
+from tirelib.diagnose.fitted import Fitted, fitted, least_error
 from tirelib.effects import CATALOGUE
 from tirelib.effects.effect import Effect, effect
 from tirelib.errors import ParameterError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.delay import UNIT, by_delay, earlier, late
+from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.select import Hypotheses
-from tirelib.infer.strain import WIDTH
+from tirelib.infer.strain import WIDTH, StrainProblem
 from tirelib.model.base import BARE, move, values_of
 from tirelib.model.state import State
 from tirelib.waveforms import GRID
@@ -33,7 +35,7 @@ LAG = (0.2, 0.02)
 def hypotheses(
     measured: StraightRuns, values: Mapping[str, float | FloatArray], *catalogue: Effect
 ) -> Hypotheses:
-    return Hypotheses(fitted_problem(measured, values, catalogue, plain_tires()), plain_tires())
+    return Hypotheses(StrainProblem(measured, values, catalogue), plain_tires())
 
 
 def base_of(
@@ -120,6 +122,40 @@ def test_a_start_far_away_ends_where_one_nearby_does(plain: Fitted, factor: floa
     assert far.error == pytest.approx(plain.error, rel=0.01)
     apart = plain.reached.prediction.strain - far.reached.prediction.strain
     assert np.sqrt(np.mean(plain.reached.white_of(apart) ** 2)) < 0.3, "a third of the noise"
+
+
+def test_a_strength_does_not_depend_on_where_the_fit_starts() -> None:
+    measured, near = runs(EFFECT, STRENGTH), values_of(TIRE)
+    moved = ("radial_stiffness", "radial_pressure_slope", "extension_stiffness", "tread_stiffness")
+    found = []
+    for factor in (1.0, 0.75):
+        values = {**near, **{n: factor * np.asarray(near[n]) for n in moved}}
+        made = hypotheses(measured, values, *CATALOGUE.values()).at((EFFECT,))
+        assert made is not None
+        found.append(made.fit)
+    one, other = found
+    assert abs(one.strengths[0] - other.strengths[0])[0] < 0.3 * min(one.std(0)[0], other.std(0)[0])
+
+
+def test_the_base_is_fitted_once_and_its_whitening_is_about_that_fit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    starts = []
+
+    def counted(problem: StrainProblem, *words: Any, **named: Any) -> Posterior:
+        starts.append(named.get("near"))
+        return posterior(problem, *words, **named)
+
+    monkeypatch.setattr("tirelib.infer.select.posterior", counted)
+    measured, near = runs(), values_of(TIRE)
+    given = StrainProblem(measured, {**near, "tread_stiffness": 2.0 * TIRE.tread_stiffness}, ())
+    among = Hypotheses(given, plain_tires())
+    # every fit but the first goes on from the one before
+    assert [start is None for start in starts] == [True] + [False] * (len(starts) - 1)
+    assert isinstance(among.problem, StrainProblem)
+    apart = among.base.fit.solved.waveform - among.problem.reference.waveform
+    assert np.std(apart) < 0.01 * np.std(measured.strain)
+    assert np.std(given.reference.waveform - among.problem.reference.waveform) > 0.0
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

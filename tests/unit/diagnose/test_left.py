@@ -14,20 +14,21 @@ from tirelib.compare.error import Yardstick, error_of
 from tirelib.compare.model import Model, model_of
 from tirelib.diagnose.diagnose import plain_tires
 from tirelib.diagnose.document import next_test
-from tirelib.diagnose.fitted import Fitted, fitted, fitted_problem
+from tirelib.diagnose.fitted import Fitted, fitted
 from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.held_out import folds, held_out_errors, pooled
 from tirelib.diagnose.left import left_of
 from tirelib.effects import CATALOGUE
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.select import Hypotheses
+from tirelib.infer.strain import StrainProblem
 from tirelib.model.base import values_of
 from tirelib.waveforms import GRID
 
 
 def base_of(measured: StraightRuns) -> Fitted:
     """Return the base model fitted to runs, among hypotheses of the whole catalogue."""
-    problem = fitted_problem(measured, values_of(TIRE), list(CATALOGUE.values()), plain_tires())
+    problem = StrainProblem(measured, values_of(TIRE), list(CATALOGUE.values()))
     among = Hypotheses(problem, plain_tires())
     return fitted(among, among.base, Yardstick.of(measured))
 

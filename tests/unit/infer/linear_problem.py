@@ -73,6 +73,9 @@ class Toy:
     def whitener(self, own: float) -> "Louder":
         return Louder(own)
 
+    def about(self, solved: Any) -> "Toy":
+        return self
+
     def solve(self, point: Point, near: Any = None) -> Solved:
         model = point.base @ self.base
         for each, strength in zip(point.effects, point.strengths, strict=True):

@@ -55,3 +55,16 @@ def test_the_rest_is_counted_from_where_the_base_starts() -> None:
     fit = posterior(toy, [EFFECTS["bend"]], SPREAD, 0.001)
     # the toy is linear: nothing but the measured numbers is left without base and effects
     assert fit.rest == pytest.approx(measured, abs=1e-9)
+
+
+def test_a_fit_from_one_nearby_ends_where_one_from_the_start_does() -> None:
+    random = np.random.default_rng(3)
+    toy = Toy(drawn(random, bend=0.5))
+    base = posterior(toy, [], SPREAD, 0.001)
+    far, near = (
+        posterior(toy, [EFFECTS["bend"]], SPREAD, 0.001, near=start) for start in (None, base)
+    )
+    assert near.strengths[0] == pytest.approx(far.strengths[0], abs=0.1 * far.std(0)[0])
+    assert near.cost == pytest.approx(far.cost, abs=0.1)
+    point = near.point
+    np.testing.assert_allclose(base.slopes_at(point), toy.slopes(point, near.solved))

@@ -8,10 +8,10 @@ import numpy as np
 from tests.synthetic import LATERAL
 from tests.unit.identify.model_waves import TIRE, made_waves, operating
 from tirelib.diagnose.diagnose import plain_tires
-from tirelib.diagnose.fitted import fitted_problem
 from tirelib.effects import CATALOGUE
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.infer.select import Hypotheses
+from tirelib.infer.strain import StrainProblem
 from tirelib.model import solution
 from tirelib.model.base import operating_points, values_of
 from tirelib.model.state import Operating
@@ -73,7 +73,7 @@ def runs(further: tuple[float, float, float] | None = None) -> StraightRuns:
 
 
 def hypotheses(measured: StraightRuns) -> Hypotheses:
-    problem = fitted_problem(measured, values_of(TIRE), list(CATALOGUE.values()), plain_tires())
+    problem = StrainProblem(measured, values_of(TIRE), list(CATALOGUE.values()))
     return Hypotheses(problem, plain_tires())
 
 
