@@ -29,6 +29,9 @@ much as a number that moves by a third of its standard deviation. Where a model 
 unit of each number, the unit grows with it."""
 STILL = 0.1
 """Move of a strength of the model's effects, in standard deviations, below which it has settled."""
+IDLE = 4
+"""Steps in a row that bring less than `SETTLED`, whatever they promise, after which a fit has
+settled: where a tread begins to slide, a slope holds on one side only and promises too much."""
 LEAST_FALL = 0.1
 """Share of what a step promises that it has to bring, or a shorter one is tried."""
 GOOD = 0.5
@@ -185,7 +188,7 @@ def posterior(
     whitened = dict(zip(shapes, np.split(white, ends), strict=True))
     rest = whiten(solved.rest)
     asked = slice(len(point.base), len(width) - sum(e.components for e in others))
-    damping = 0.0
+    damping, idle = 0.0, 0
     for _ in range(MOST_STEPS):
         white_slopes = whiten(slopes)
         rows = np.concatenate([white_slopes, white])
@@ -200,7 +203,8 @@ def posterior(
         within = low - here, high - here
         trial, dz = None, _step(gram, gradient, *within)
         promised = _fall(gram, gradient, dz)
-        there = promised < settled * max(1.0, cost / rest.size)
+        little = settled * max(1.0, cost / rest.size)
+        there = promised < little
         there = there and bool((np.abs(dz[asked]) < STILL * deviation[asked]).all())
         while not there and damping < HARDEST:
             dz = _step(gram + damping * np.diag(np.diag(gram)), gradient, *within)
@@ -223,6 +227,10 @@ def posterior(
             slopes, exact, damping = problem.slopes(point, solved), True, 0.0
             continue
         (point, solved), rest = trial, left
+        idle = idle + 1 if cost - after < little else 0
+        if idle == IDLE:
+            cost = after
+            break
         damping = max(damping, FIRST) if brought < GOOD else 0.1 * damping
         if progress is not None:
             progress(f"fit of {', '.join(e.name for e in effects) or 'the base'}, cost {after:.0f}")
