@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from tirelib.diagnose.guess import Guess
 from tirelib.diagnose.held_out import Fold, fold_entry, folds, held_out_errors, pooled
 from tirelib.diagnose.left import Left, left_of, told_powers
 from tirelib.errors import TirelibError
+from tirelib.forked import forked
 
 FORMAT = "tirelib-diagnosis/1"
 NO_REPEATS = (
@@ -103,17 +105,15 @@ def assess(
     floor = floor_of(after, found.verdict.best, found.verdict.alpha)
     chosen = folds(found.problem.data) if named else ()
 
-    def held(model: Fitted) -> tuple[float, ...]:
-        if progress is not None and chosen:
-            progress("fits without some of the runs")
-        return held_out_errors(model, chosen, yardstick)
-
-    held_before = held(found.base)
-    held_after = {
-        name: held(single) for name in named if (single := _with_one(found, name)) is not None
-    }
-    alone = next((held_after[name] for name in named if (name,) == named), None)
-    held_final = alone or held(final)
+    if progress is not None and chosen:
+        progress("fits without some of the runs")
+    singles = {name: single for name in named if (single := _with_one(found, name)) is not None}
+    models = [found.base, *singles.values()]
+    if len(named) > 1 or (named and not singles):
+        models.append(final)
+    held = forked([partial(held_out_errors, model, chosen, yardstick) for model in models])
+    held_before, held_final = held[0], held[-1]
+    held_after = dict(zip(singles, held[1:], strict=False))
     if named and not chosen:
         messages.append(
             "nothing can be held out: three loads or two pressures, and four other runs, are needed"

@@ -20,7 +20,7 @@ from tirelib.identify.delay import UNIT
 from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Point
-from tirelib.infer.select import Hypotheses
+from tirelib.infer.select import ROUGH, Hypotheses
 from tirelib.infer.strain import StrainProblem
 from tirelib.model.base import move
 from tirelib.rolling.solve import Rolling
@@ -104,7 +104,14 @@ class Fitted:
         start = Point(fit.point.base, self.effects, self.strengths)
         assert isinstance(among.problem, StrainProblem)  # noqa: S101 - of strain
         part = among.problem.part(~out, start)
-        found = posterior(part, self.effects, among.spread, among.own, strengths=self.strengths)
+        found = posterior(
+            part,
+            self.effects,
+            among.spread,
+            among.own,
+            strengths=self.strengths,
+            settled=ROUGH,
+        )
         values = move(part.values, found.point.base[:-1], part.free)
         model = Model.fitted(values, found.effects, found.strengths)
         return model, UNIT * float(found.point.base[-1])

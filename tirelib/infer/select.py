@@ -12,11 +12,13 @@ missing; several, they cannot be told apart; none at all, something unknown is t
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from tirelib.effects import Effect
 from tirelib.errors import ParameterError, TirelibError
+from tirelib.forked import forked
 from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.plain import Family, pooled
 from tirelib.infer.posterior import SETTLED, Posterior, posterior
@@ -27,7 +29,8 @@ SINGLES, PARTNERS, LEADERS = 6, 3, 2
 ROUNDS = 5
 """Most times that the whitening follows the fit without further effects."""
 ROUGH = 5.0
-"""Fall of the cost that a step has to promise on the way there, in units of a chi-square."""
+"""Fall of the cost that a step has to promise, in units of a chi-square, where errors are asked for
+and no strengths."""
 MOST = 3
 """Effects of a hypothesis at most."""
 
@@ -131,23 +134,36 @@ class Hypotheses:
 
         `near` is a fit from which this one starts.
         """
-        key = frozenset(names)
-        if key not in self._made:
-            near = near or self.base
-            more = [self.effects[name] for name in names]
-            try:
-                fit = posterior(
-                    self.problem,
-                    [*self.had, *more],
-                    self.spread,
-                    self.own,
-                    near=near.fit,
-                    progress=self.progress,
-                )
-                self._made[key] = self._tested(fit)
-            except TirelibError:
-                self._made[key] = None
-        return self._made[key]
+        return self.each([(names, near or self.base)])[0]
+
+    def each(self, wanted: Sequence[tuple[Sequence[str], Hypothesis]]) -> list[Hypothesis | None]:
+        """Return several hypotheses, each with the one from whose fit its own starts, as `at`."""
+        new = {frozenset(names): (names, near) for names, near in wanted}
+        new = {key: each for key, each in new.items() if key not in self._made}
+        if new and self.progress is not None:
+            self.progress(
+                f"fits with {'; '.join(' and '.join(names) for names, _ in new.values())}"
+            )
+        calls = [partial(self._alone, *each) for each in new.values()]
+        shared = [*self.had, *self.effects.values(), *self.families]
+        found = forked(calls, shared)
+        self._made |= dict(zip(new, found, strict=True))
+        return [self._made[frozenset(names)] for names, _ in wanted]
+
+    def _alone(self, names: Sequence[str], near: Hypothesis) -> Hypothesis | None:
+        """Return a hypothesis from a fit nearby; None where no fit settles."""
+        more = [self.effects[name] for name in names]
+        try:
+            fit = posterior(
+                self.problem,
+                [*self.had, *more],
+                self.spread,
+                self.own,
+                near=near.fit,
+            )
+            return self._tested(fit)
+        except TirelibError:
+            return None
 
     def added(self, hypothesis: Hypothesis) -> tuple[str, ...]:
         """Return the names of a hypothesis' further effects."""
@@ -186,7 +202,7 @@ def select(
 ) -> Verdict:
     """Return which effects, if any, a model lacks; arguments and errors are `Hypotheses`'."""
     hypotheses = Hypotheses(problem, families, false_alarm, progress)
-    base, alpha, at = hypotheses.base, false_alarm, hypotheses.at
+    base, alpha = hypotheses.base, false_alarm
 
     def done(kind: str, members: Sequence[Hypothesis]) -> Verdict:
         best = members[0] if members else base
@@ -196,11 +212,15 @@ def select(
         return done("none", ())
     leaders: list[Hypothesis] = [base]
     for size in range(1, MOST + 1):
-        level = [
-            at((*hypotheses.added(leader), further), leader)
-            for leader in leaders
-            for further in _further(leader, hypotheses.effects, SINGLES if size == 1 else PARTNERS)
-        ]
+        level = hypotheses.each(
+            [
+                ((*hypotheses.added(leader), further), leader)
+                for leader in leaders
+                for further in _further(
+                    leader, hypotheses.effects, SINGLES if size == 1 else PARTNERS
+                )
+            ]
+        )
         # two leaders may lead to one and the same set
         fitted = [h for h in dict.fromkeys(level) if h is not None and h.plausible]
         fitted.sort(key=lambda h: -h.likelihood)

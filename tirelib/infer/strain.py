@@ -7,6 +7,7 @@ the gages against the trigger.
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -107,6 +108,11 @@ class StrainSolved:
     model: Solution
     delay: float
     waveform: FloatArray
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Leave the effects' changes out, which are functions; the point makes them again."""
+        bare = replace(self.model, changes=())
+        return _with_changes, (self.rest, self.point, bare, self.delay, self.waveform)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -495,6 +501,12 @@ def in_base(values: Mapping[str, float | FloatArray]) -> set[str]:
     """Return the effects that a tire's base model fits as numbers."""
     numbers = {coordinate.name for coordinate in coordinates(values)}
     return {effect for effect, number in IN_BASE.items() if number in numbers}
+
+
+def _with_changes(
+    rest: FloatArray, point: Point, bare: Solution, delay: float, waveform: FloatArray
+) -> StrainSolved:
+    return StrainSolved(rest, point, replace(bare, changes=_changes(point)), delay, waveform)
 
 
 def _changes(point: Point) -> Changes:

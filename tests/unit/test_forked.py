@@ -1,0 +1,54 @@
+"""Calls in this process and in a copy of it: the same results with one processor and two."""
+
+import os
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+import pytest
+
+from tirelib.errors import ParameterError
+from tirelib.forked import forked
+
+COUNT = 5
+
+
+@pytest.fixture(params=[1, 2])
+def processors(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
+    monkeypatch.setattr("tirelib.forked._processors", lambda: request.param)
+    return int(request.param)
+
+
+def test_results_come_in_the_order_of_the_calls(processors: int) -> None:
+    found = forked([partial(np.full, 3, float(k)) for k in range(COUNT)])
+    np.testing.assert_array_equal(found, np.arange(COUNT)[:, None] * np.ones(3))
+
+
+def test_every_other_call_is_computed_by_a_copy(processors: int) -> None:
+    found = {pid == os.getpid() for pid in forked([os.getpid] * COUNT)[1::2]}
+    assert found == {processors == 1}
+
+
+def test_what_both_have_comes_back_as_the_same_object(processors: int) -> None:
+    def law() -> None:
+        """Be a function that cannot be sent."""
+
+    def tell() -> tuple[Callable[[], None], int]:
+        return law, 3
+
+    assert all(each[0] is law for each in forked([tell] * 2, [law]))
+
+
+def test_what_cannot_be_sent_is_computed_here(processors: int) -> None:
+    made: list[Callable[[], int]] = forked([lambda: lambda: 7] * 2)
+    assert [each() for each in made] == [7, 7]
+
+
+def test_what_a_call_raises_is_raised_here(processors: int) -> None:
+    def refuse() -> int:
+        raise ParameterError("no such thing")
+
+    with pytest.raises(ParameterError, match="no such thing"):
+        forked([lambda: 1, refuse])
+    with pytest.raises(ParameterError, match="no such thing"):
+        forked([refuse, lambda: 1])
