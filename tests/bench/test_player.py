@@ -134,6 +134,22 @@ def test_the_sidecar_keeps_the_plan_and_the_campaign() -> None:
     assert back.runs[0].plan["load"] == 3000.0
 
 
+def test_conditions_end_with_the_strain_of_their_run() -> None:
+    runs = [
+        replace(run, rig_time=time, rig={"speed": np.full(8, 18.0)}, start_time=2.0)
+        for run in tiny_runs()[:2]
+        for time in [2.0 + 0.2 * np.arange(8.0)]  # 1.4 s, where the strain has 0.65 s
+    ]
+    conditions = record_tape(runs, Device(), Faults({}), (0,)).conditions
+    parse_conditions(conditions_document(conditions), "x")  # refuses times that do not increase
+    assert [t for t in conditions.t_us if t < conditions.runs[1].t_us] == [
+        0,
+        200_000,
+        400_000,
+        600_000,
+    ]
+
+
 MANOEUVRE = """
 format = "tirebench-manoeuvre/1"
 [[point]]

@@ -20,7 +20,7 @@ from tirelib.cli.common import (
     progress_bar,
     write_json,
 )
-from tirelib.cli.limits import not_checked, not_given, outside, weakly_checked
+from tirelib.cli.limits import extrapolated, not_checked, not_given, outside, weakly_checked
 from tirelib.cli.options import json_option
 from tirelib.documents import file_hash
 from tirelib.errors import CalibrationError
@@ -201,7 +201,12 @@ def print_document(name: str, document: dict[str, Any], calibration: Calibration
             "in a thousand would, on a worn tread under a high load one in twenty); check whether "
             "this tire is on the wheel, and whether it is worn or soft; otherwise calibrate again"
         )
-    limits = (outside(turns, calibration), weakly_checked(other), *not_checked(calibration))
+    limits = (
+        outside(turns, calibration),
+        extrapolated(turns, calibration),
+        weakly_checked(other),
+        *not_checked(calibration),
+    )
     for sentence in (not_given(document["not_given"]), *limits):
         if sentence:
             console.print(sentence)

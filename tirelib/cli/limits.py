@@ -1,5 +1,6 @@
 """Notes after a calibration or an estimate: cost of missing conditions, missing checks."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -85,6 +86,33 @@ def _calibrated(calibration: Calibration, counts: Mapping[str, int]) -> list[str
             low, high = (f"{factor * end:,.4g}" for end in (own[0].low, own[0].high))
             found.append(f"{quantity} from {low} to {high}{'' if unit == '1' else f' {unit}'}")
     return found or ["the conditions of its runs"]
+
+
+def extrapolated(turns: Sequence[Mapping[str, Any]], calibration: Calibration) -> str:
+    """Return a sentence on turns at an uncalibrated speed or pressure; empty if there are none.
+
+    Parameters
+    ----------
+    turns : sequence of mappings
+        ``turns`` of an estimate document.
+    calibration : Calibration
+    """
+    away = sum("condition_extrapolated" in turn["flags"] for turn in turns)
+    if not away:
+        return ""
+    laws = calibration.chains[-1].laws
+    ends = (("speeds", laws.speed, 3.6, "km/h"), ("pressures", laws.pressure, 1e-5, "bar"))
+    known = " and ".join(
+        f"{name} from {factor * low:.3g} to {factor * high:.3g} {unit}"
+        for name, (low, high), factor, unit in ends
+        if math.isfinite(low) and math.isfinite(high)
+    )
+    return (
+        f"{away} of {len(turns)} turns have a speed or pressure that was not calibrated "
+        f"(calibrated are {known or 'none that were measured'}), or an unknown pressure: their "
+        "estimates follow an assumed law, whose doubt is in the standard deviations; calibrate at "
+        "these speeds and pressures to be rid of it"
+    )
 
 
 def not_checked(calibration: Calibration) -> list[str]:

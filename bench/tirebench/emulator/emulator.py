@@ -289,8 +289,9 @@ def _samples(run: Run) -> int:
 
 
 def _conditions(run: Run) -> Iterator[tuple[float, Condition]]:
-    """Yield time [s, the run's clock] and conditions wherever they may change."""
+    """Yield time [s, the run's clock] and conditions wherever they change while strain is sent."""
     times = changes_of(run)
+    times = times[times < run.start_time + _samples(run) / run.rate]
     table = np.stack(list(conditions_of(run, times).values()))
     for moment, values in zip(times.tolist(), table.T.tolist(), strict=True):
         yield moment, tuple(values)
