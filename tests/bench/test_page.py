@@ -151,6 +151,20 @@ def test_a_lap_puts_the_contact_at_zero_and_the_leading_side_first() -> None:
         np.testing.assert_allclose(grid[gage], GRID + gage, atol=1e-3)  # float32 of 180 deg
 
 
+def test_a_lap_of_samples_that_come_one_by_one_ends_with_a_sample_that_has_come() -> None:
+    laps, cut = Laps(0), []
+    laps.samples(block(0, np.full((2000, 5), 7.0)))  # what a new segment leaves in memory
+    strain = np.ones((2000, 5))
+    laps.samples(block(0, strain[:1], 1))
+    for first in range(1, 2000):
+        laps.samples(block(first, strain[first : first + 1], 1))
+        if first == 1000:
+            laps.turn(replace(turn(1, 0.10003), segment=1), 1)
+        cut += laps.take()
+    (lap,) = cut
+    np.testing.assert_array_equal(lap.strain, 1.0)
+
+
 def test_what_is_lost_is_a_hole_and_a_slow_lap_is_thinned_not_cut() -> None:
     laps = Laps(0)
     strain = np.zeros((12_000, 5))

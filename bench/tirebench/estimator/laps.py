@@ -84,6 +84,11 @@ class _Pending:
     middle: float
     half: float
 
+    @property
+    def last(self) -> int:
+        """Number of the first sample at or after the end of the lap."""
+        return math.ceil(self.middle + self.half)
+
 
 class Laps:
     """The samples of one wheel, cut into laps as the turns come.
@@ -142,7 +147,7 @@ class Laps:
     def take(self) -> list[Lap]:
         """Return the laps whose last sample has come."""
         end, laps = self._start + self._used, []
-        while self._pending and self._pending[0].middle + self._pending[0].half < end:
+        while self._pending and self._pending[0].last < end:
             lap = self._cut(self._pending.popleft())
             if lap is None:
                 self.lost += 1
@@ -152,8 +157,8 @@ class Laps:
 
     def _cut(self, pending: _Pending) -> Lap | None:
         first = math.floor(pending.middle - pending.half)
-        last = math.ceil(pending.middle + pending.half)
-        if last - self._start > self._used or last <= self._start:
+        last = pending.last
+        if last - self._start >= self._used or last <= self._start:
             return None
         first = max(first, self._start)
         every = math.ceil((last - first) / MOST_SAMPLES)

@@ -6,7 +6,7 @@ NOTHING = "no byte was received: check that the transmitter is on and that this 
 NO_FRAME = (
     "bytes were received, but no valid frame: check the rate (--baud, or --bitrate and "
     "--data-bitrate), the kind of port (PORT or slcan:PORT), and whether another make's "
-    "transmitter needs --map"
+    "transmitter needs --map, or its map another sync, struct, checksum or checksum_from"
 )
 
 
