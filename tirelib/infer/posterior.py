@@ -32,6 +32,10 @@ STILL = 0.1
 IDLE = 4
 """Steps in a row that bring less than `SETTLED`, whatever they promise, after which a fit has
 settled: where a tread begins to slide, a slope holds on one side only and promises too much."""
+FAR, LOOSE = 10.0, 0.03
+"""A model that leaves more than `FAR` of what noise leaves is settled by steps that bring less than
+`LOOSE` of that surplus: it lacks something strong, and how near it comes to the runs without that
+decides nothing."""
 LEAST_FALL = 0.1
 """Share of what a step promises that it has to bring, or a shorter one is tried."""
 GOOD = 0.5
@@ -71,6 +75,8 @@ class Posterior:
         Of its coordinates.
     cost : float
         J at the point.
+    far : bool
+        Whether the model leaves more than `FAR` of what noise leaves.
     """
 
     point: Point
@@ -81,6 +87,7 @@ class Posterior:
     widths: FloatArray
     covariance: FloatArray
     cost: float
+    far: bool
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -227,7 +234,8 @@ def posterior(
             slopes, exact, damping = problem.slopes(point, solved), True, 0.0
             continue
         (point, solved), rest = trial, left
-        idle = idle + 1 if cost - after < little else 0
+        brings = max(little, LOOSE * (cost - FAR * rest.size))
+        idle = idle + 1 if cost - after < brings else 0
         if idle == IDLE:
             cost = after
             break
@@ -259,6 +267,7 @@ def posterior(
         width[:count],
         covariance,
         cost,
+        bool(cost > FAR * rest.size),
     )
 
 

@@ -122,8 +122,8 @@ class Hypotheses:
         for _ in range(ROUNDS):
             # a whitening is right nearby only
             nearer = problem.about(fit.solved)
-            if nearer is problem:
-                break
+            if nearer is problem or fit.far:
+                break  # a model that is far off has no whitening that is right
             problem, fit = nearer, self._fitted(nearer, fit, ROUGH)
         self.problem = problem
         self.base = self._tested(self._fitted(problem, fit, SETTLED))
