@@ -77,14 +77,13 @@ export class Suspect {
     const rank = (part) => Math.min(...groups.get(part).map((r) => Number(r.dataset.rank || 999)), 999);
     fill(this.list, h("div", { class: "row" }, h("h2", {}, "Effects"), h("span", { class: "quiet small" }, "Hover or focus a line to see what the effect would leave; tick what to add."), h("span", { class: "room" }),
       this.button = h("button", { class: "main", type: "button", id: "add", onclick: () => this.add() }, "Add")),
-    h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n" }, withP ? "p" : "score / threshold"), h("th", {}, "strength"), h("th", { class: "n", title: `error with this effect, ${unitName(told.error_unit)}` }, "error with it"), h("th", { class: "n", title: "chance that a diagnosis of this plan finds the effect at this strength" }, "chance to find it"))),
+    h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n" }, withP ? "p" : "score / threshold"), h("th", { title: "± one standard deviation" }, "strength"), h("th", { class: "n", title: `error with this effect, ${unitName(told.error_unit)}` }, "error with it"), h("th", { class: "n", title: "chance that a diagnosis of this plan finds the effect at this strength" }, "chance to find it"))),
       h("tbody", {}, [...groups.keys()].filter((part) => groups.get(part).length).sort((a, b) => rank(a) - rank(b)).map((part) => [h("tr", { class: "part" }, h("td", { colspan: 6 }, part)), ...groups.get(part).sort((a, b) => Number(a.dataset.rank || 999) - Number(b.dataset.rank || 999))])))));
     this.count();
   }
 
   candidate(e) {
     const { told } = this, sets = (told.sets || []).flatMap((set, i) => (set.includes(e.effect) ? [i + 1] : []));
-    const half = Array.isArray(e.std) ? e.std.map((s) => 1.96 * s) : 1.96 * e.std;
     const box = h("input", { type: "checkbox", "aria-label": `tick ${e.effect}`, "data-effect": e.effect, checked: this.ticked.has(e.effect), onchange: () => { if (box.checked) this.ticked.add(e.effect); else this.ticked.delete(e.effect); this.count(); } });
     const on = () => this.hover(e.effect);
     return h("tr", { "data-rank": e.rank, "data-name": e.effect, onmouseenter: on, onfocusin: on },
@@ -92,7 +91,7 @@ export class Suspect {
       h("td", {}, h("button", { class: "small", type: "button", title: "What it is, its source, what it would look like here", onclick: () => this.page(e.effect, e) }, e.effect), " ", told.named.includes(e.effect) ? h("span", { class: "tag alarm" }, "named") : e.level !== "quiet" ? h("span", { class: "tag" }, e.level) : null,
         h("div", { class: "small quiet" }, this.title(e.effect)?.title || e.title || "", e.twins.length ? ` Looks like ${e.twins.map((t) => `${t.effect} (${number(t.angle_deg, 2)} deg apart)`).join(", ")}.` : "", sets.length ? ` In set ${sets.join(", ")}.` : "")),
       h("td", { class: "n" }, e.p !== undefined && e.p !== null ? [number(e.p, 2), e.p_std ? h("div", { class: "small quiet" }, `± ${number(e.p_std, 1)}`) : null] : number(e.score / e.threshold, 3)),
-      h("td", {}, `${strength(e.strength)} ± ${strength(half, 2)} ${e.unit === "1" ? "" : e.unit}`, e.in_range ? null : h("div", { class: "small warn" }, `outside the plausible ${(e.range || []).map((x) => number(x)).join(" to ")}`)),
+      h("td", {}, `${strength(e.strength)} ± ${strength(e.std, 2)} ${e.unit === "1" ? "" : e.unit}`, e.in_range ? null : h("div", { class: "small warn" }, `outside the plausible ${(e.range || []).map((x) => number(x)).join(" to ")}`)),
       h("td", { class: "n" }, number(e.error_after)),
       h("td", { class: "n small quiet" }, e.power !== undefined && e.power !== null ? `${number(100 * e.power, 2)} %` : ""));
   }
