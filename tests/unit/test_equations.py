@@ -11,7 +11,11 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = {"tirelib": ROOT / "tirelib", "tirebench": ROOT / "bench/tirebench"}
+PACKAGES = {
+    "tirelib": ROOT / "tirelib",
+    "tirebench": ROOT / "bench/tirebench",
+    "routes": ROOT / "build/routes",
+}
 ONE = r"(?:\(\d+\)|\d+)"
 CITED = re.compile(rf"\bEq\.\s+({ONE}(?:(?:,? and |,\s+|\s+to\s+|-){ONE})*)")
 LISTED: list[dict[str, Any]] = [

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from tirelib.identify.whole import Whole
 
 BASES = ("plain", "dissertation")
-MOST_ROWS = 12
-"""Rows of the table of contact angles on the screen."""
 
 _EXAMPLE = """\b
 Examples:
@@ -133,84 +131,6 @@ def _say_ring(console: Console, document: dict[str, Any], gages: int) -> None:
         console.print(
             f"  vertical stiffness at {stiffness['load_N']:.0f} N: model "
             f"{stiffness['model']:.1f}, measured {stiffness['measured']:.1f} N/mm"
-        )
-    _say_routes(console, document["chapter_5"], document["chapter_6"])
-    if document["damping"] is not None:
-        _say_damping(console, document["damping"])
-
-
-def _say_routes(
-    console: Console, static: dict[str, Any] | None, dynamic: dict[str, Any] | None
-) -> None:
-    """Contact angles with the bias of their reading, and loads by angle (Fig. 6-12, 6-21)."""
-    if dynamic is not None:
-        table = Table(box=SIMPLE_HEAD)
-        for column in (
-            "run",
-            "load N",
-            "half angle read",
-            "bias",
-            "corrected",
-            "+-",
-            "load error % as printed",
-            "corrected",
-        ):
-            table.add_column(column, justify="right")
-        angles = {row["run"]: row for row in dynamic["contact_angles"]}
-        loads = dynamic["loads"]
-        step = -(-len(loads) // MOST_ROWS)
-        for load in loads[::step]:
-            row = angles[load["run"]]
-            half = [0.5 * (row[key][1] - row[key][0]) for key in ("read_deg", "corrected_deg")]
-            printed = load["as_printed_percent"]
-            table.add_row(
-                str(load["run"]),
-                f"{load['measured_N']:.0f}",
-                f"{half[0]:.2f} deg",
-                f"{row['half_bias_deg']:+.2f}",
-                f"{half[1]:.2f}",
-                f"{row['half_std_deg']:.2f}",
-                "" if printed is None else f"{printed:+.1f}",
-                f"{load['corrected_percent']:+.1f}",
-            )
-        console.print(
-            "contact angles from strain-rate peaks, the bias of this method, and the load that "
-            "follows from them" + (f" (every {step}th run; --json writes all)" if step > 1 else "")
-        )
-        console.print(table)
-    if static is not None:
-        names = (("bending_stiffness", "N m^2"), ("radial_stiffness", "N/m^2"))
-        found = [
-            {q["name"]: q["value"] for q in static[key]}
-            for key in ("from_strain", "from_contact_model")
-        ]
-        said = "; ".join(
-            f"{name} {found[0][name]:.3g}"
-            + (f" against {found[1][name]:.3g}" if name in found[1] else "")
-            + f" {unit}"
-            for name, unit in names
-        )
-        console.print(
-            "  static ring without tension (chapter 5), fitted to strain with the contact model: "
-            f"{said}"
-        )
-
-
-def _say_damping(console: Console, damping: dict[str, Any]) -> None:
-    def words(found: dict[str, Any] | None) -> str:
-        if found is None:
-            return "none"
-        flags = f" ({', '.join(found['flags'])})" if found["flags"] else ""
-        return f"{found['value']:.3f}, 95 % {found['low']:.3f} to {found['high']:.3f}{flags}"
-
-    console.print(f"  damping of the sidewall's dashpots: {words(damping)}, from strain alone;")
-    console.print("    it is not in the model; `tirelib add sidewall_damping` adds it")
-    readings, modal = damping["readings"], damping["modal"]
-    console.print(f"    with the wheel angle from the trigger: {words(readings['with_angle'])}")
-    if modal is not None:
-        console.print(
-            f"    as a ratio of every mode, Eq. (107): {words(modal['without_angle'])}; this is "
-            "the value for `tirelib simulate --damping`"
         )
 
 

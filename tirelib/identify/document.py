@@ -1,16 +1,15 @@
 """An identification as JSON (``tirelib-identification/1``) and as a model file."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
-from tirelib.identify.dynamic_route_validation import rim_checks
 from tirelib.identify.identify import Identification
-from tirelib.identify.static_route_fit import Quantity
 from tirelib.parameters import FIELDS, TireFile
+from tirelib.ring.frequencies import rim_stiffness
 from tirelib.units import from_si
 
 FORMAT = "tirelib-identification/1"
@@ -74,13 +73,14 @@ def _vertical_stiffness(found: Identification) -> dict[str, float | None]:
 def _rim_stiffness(found: Identification) -> dict[str, float]:
     """Return what tests of the held tread would give, Eq. (112) corrected, for comparison."""
     tire = found.tire.tire
-    none = {"shift": 0.0, "turn": 0.0, "longitudinal": 0.0}
-    S_v, S_theta, K_x = (c.predicted for c in rim_checks(asdict(tire), tire.pressure, **none))
+    radius = tire.ring_radius
+    shift, turn = rim_stiffness(radius, tire.radial_stiffness, tire.tangential_stiffness)
     return {
         "pressure_bar": 1e-5 * tire.pressure,
-        "shift_N_per_mm": 1e-3 * S_v,
-        "turn_Nm_per_deg": S_theta * np.pi / 180.0,
-        "longitudinal_N_per_mm": 1e-3 * K_x,
+        "shift_N_per_mm": 1e-3 * float(shift),
+        "turn_Nm_per_deg": float(turn) * np.pi / 180.0,
+        # pulled along a road that holds the belt, the rim shifts and turns against it
+        "longitudinal_N_per_mm": 1e-3 / float(1.0 / shift + radius**2 / turn),
     }
 
 
@@ -90,40 +90,14 @@ def _slope(deflection: FloatArray, load: FloatArray) -> float:
     return float(1e-3 / fitted(float(load.mean())))
 
 
-def model_file(
-    found: Identification, damping: Quantity | None = None, modal: Quantity | None = None
-) -> TireFile:
-    """Return the identified tire as a model without effects, with the correlation of its numbers.
-
-    The damping stands beside the model: the base has none, so that its lack can be diagnosed. The
-    number is that of dashpots beside the sidewall's springs; `modal` is the ratio of every mode
-    that shifts the contact alike, several times smaller, and the one that the models take.
-    """
-    beside: dict[str, Any] = {
+def model_file(found: Identification) -> TireFile:
+    """Return the identified tire as a model without effects; it holds its numbers' correlation."""
+    extra = {
+        **found.tire.extra,
         "identified_correlation": {
             "names": [each.name for each in found.estimates],
             "values": found.correlation.tolist(),
-        }
-    }
-    if damping is not None:
-        beside["identified_damping"] = {
-            "value": damping.value,
-            "unit": "1",
-            "std": damping.std,
-            "interval": [damping.low, damping.high],
-            "flags": list(damping.flags),
-            "law": "sidewall: c = 2 lambda sqrt(k rhoA)",
-            "source": "lag of the contact's edges behind the compressive peaks over speed",
-        }
-    if damping is not None and modal is not None:
-        beside["identified_damping"] |= {
-            "modal_value": modal.value,
-            "modal_interval": [modal.low, modal.high],
-            "modal_law": "c_n = 2 lambda sqrt(m_n k_n), as simulate takes it",
-        }
-    extra = {
-        **found.tire.extra,
-        **beside,
+        },
         "model": {"ring": "large displacements", "contact": "radial"},
         "effects": [],
         "history": [],

@@ -11,7 +11,6 @@ from tirelib.identify.document import FORMAT, identification_document
 from tirelib.identify.error_bands import BandError
 from tirelib.identify.forces import ForceIdentification
 from tirelib.identify.lateral_force import PressureComparison
-from tirelib.identify.routes_document import routes_document
 from tirelib.identify.whole import Whole
 from tirelib.parameters import NUMBERS
 from tirelib.units import from_si
@@ -23,11 +22,11 @@ _BY = {"load": ("N", 1.0), "pressure": ("bar", 1e-5), "slip_angle": ("deg", 1.0 
 
 def whole_document(campaign: Campaign, whole: Whole) -> dict[str, Any]:
     """Return ring and brush; what the campaign does not tell is null or empty."""
-    if whole.ring is not None and whole.routes is not None:
-        document = identification_document(campaign, whole.ring) | routes_document(whole.routes)
+    if whole.ring is not None:
+        document = identification_document(campaign, whole.ring)
     else:
         document = _no_ring(campaign, whole)
-    document["reasons"] = [*document["reasons"], *whole.reasons]
+    document["reasons"] = list(whole.reasons)
     document["provenance"] = dict(whole.file.extra["provenance"])
     brush = whole.brush
     document["brush"] = None if brush is None else brush_document(brush)
@@ -57,10 +56,6 @@ def _no_ring(campaign: Campaign, whole: Whole) -> dict[str, Any]:
         "rim_stiffness": None,
         "steps": None,
         "provenance": {},
-        "damping": None,
-        "chapter_5": None,
-        "chapter_6": None,
-        "reasons": [],
     }
 
 

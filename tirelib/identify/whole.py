@@ -10,8 +10,7 @@ from tirelib.errors import CalibrationError, TirelibError
 from tirelib.identify.brush_model import STORED
 from tirelib.identify.document import model_file
 from tirelib.identify.forces import ForceIdentification, identify_forces
-from tirelib.identify.identify import Identification, identify, start_file
-from tirelib.identify.routes import Routes, follow_routes
+from tirelib.identify.identify import Identification, identify
 from tirelib.identify.strain_notes import broken_gages, ring_expected
 from tirelib.parameters import Number, Tire, TireFile
 from tirelib.threads import one_thread
@@ -27,8 +26,6 @@ class Whole:
     Attributes
     ----------
     ring : Identification or None
-    routes : Routes or None
-        Beside the ring.
     brush : ForceIdentification or None
     reasons : tuple of str
         Why a part is absent, and which runs and gages were not used.
@@ -39,7 +36,6 @@ class Whole:
     """
 
     ring: Identification | None
-    routes: Routes | None
     brush: ForceIdentification | None
     reasons: tuple[str, ...]
     ring_failed: str
@@ -76,12 +72,10 @@ def identify_whole(
     """
     reasons: list[str] = []
     known = _start(campaign, start, reasons)
-    ring, routes, failed = None, None, ""
+    ring, failed = None, ""
     if campaign.header.gage_lateral:
         try:
             ring = identify(campaign, known, base=base, progress=progress)
-            first = start_file(campaign.header, ring.runs, known, "dissertation")
-            routes = follow_routes(ring.runs, first, progress=progress)
             reasons += ring.notes
         except TirelibError as error:
             why = "; ".join([f"no ring: {error}", *broken_gages(campaign)])
@@ -103,10 +97,10 @@ def identify_whole(
         reasons.append(f"the ring of {known.name} gives the contact length")
     if ring is None and brush is None:
         raise CalibrationError("; ".join(reasons))
-    file = _file(campaign, known, ring, routes, brush)
+    file = _file(campaign, known, ring, brush)
     if not file.missing:
         _ = file.tire  # a file that no verb could read is refused here
-    return Whole(ring, routes, brush, tuple(reasons), failed, file)
+    return Whole(ring, brush, tuple(reasons), failed, file)
 
 
 def _start(campaign: Campaign, start: TireFile | None, reasons: list[str]) -> TireFile | None:
@@ -132,15 +126,10 @@ def _file(
     campaign: Campaign,
     known: TireFile | None,
     ring: Identification | None,
-    routes: Routes | None,
     brush: ForceIdentification | None,
 ) -> TireFile:
     """Return the model: the ring's file, or a file of geometry, with the brush's numbers."""
-    if ring is not None:
-        told = (routes.damping, routes.modal_damping) if routes is not None else (None, None)
-        base = model_file(ring, *told)
-    else:
-        base = _without_ring(campaign, known)
+    base = model_file(ring) if ring is not None else _without_ring(campaign, known)
     if brush is None:
         return base
     extra: dict[str, Any] = dict(base.extra)

@@ -1,4 +1,4 @@
-"""Parameters, data and residuals of the fit of `tirelib.identify.dynamic_route`."""
+"""Parameters, data and residuals of the fit of `routes.dynamic_route`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,13 +6,13 @@ from typing import Literal
 
 import numpy as np
 
+from routes.dynamic_route_validation import predicted_deflection
+from routes.edges import STRUCTURE, Edges, corrected, edge_bias, model_edges, read_edges
+from routes.static_route_fit import FewFit, Parameter, Quantity, fit_few
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact import radial
 from tirelib.errors import CalibrationError, ConvergenceError, ParameterError
 from tirelib.identify.campaign_data import StraightRuns
-from tirelib.identify.dynamic_route_validation import predicted_deflection
-from tirelib.identify.edges import STRUCTURE, Edges, corrected, edge_bias, model_edges, read_edges
-from tirelib.identify.static_route_fit import FewFit, Parameter, Quantity, fit_few
 from tirelib.model.base import Correction, large_displacements, operating_points, values_of
 from tirelib.model.state import State
 from tirelib.parameters import TireFile

@@ -1,13 +1,13 @@
-"""The two fits of `tirelib.identify.static_route`: from strain, and by pressing the tire."""
+"""The two fits of `routes.static_route`: from strain, and by pressing the tire."""
 
 import numpy as np
 
+from routes.static_route_fit import FewFit, Parameter, Quantity, fit_few, profile
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact.profiles import convex_concave
 from tirelib.contact.static import StaticContact, StaticTire, press_to_deflection
 from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.identify.campaign_data import StraightRuns
-from tirelib.identify.static_route_fit import FewFit, Parameter, Quantity, fit_few, profile
 from tirelib.parameters import TireFile
 from tirelib.ring.green import modal_response
 from tirelib.signal import LowPass

@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from routes.static_route import load_series, static_route
+from routes.static_route_fit import Parameter, Quantity, fit_few, profile
+from routes.static_route_problem import StrainProblem
 
-from tests.unit.identify.route_campaign import SERIES, runs, tire, tire_file
+from tests.routes.route_campaign import SERIES, runs, tire, tire_file
 from tirelib.arrays import FloatArray
 from tirelib.contact.static import StaticTire, press_to_load
 from tirelib.errors import CalibrationError
 from tirelib.identify.campaign_data import StraightRuns
-from tirelib.identify.static_route import load_series, static_route
-from tirelib.identify.static_route_fit import Parameter, Quantity, fit_few, profile
-from tirelib.identify.static_route_problem import StrainProblem
 from tirelib.model.base import operating_points, smoothed
 from tirelib.ring.green import modal_response, pressed_shape
 from tirelib.signal import LowPass

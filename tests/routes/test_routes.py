@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from routes.document import routes_document
+from routes.dynamic_pressure import dynamic_pressure
+from routes.follow import Routes, follow_routes
+from routes.run import lines
 
-from tests.unit.identify.route_campaign import SERIES, runs, tire, tire_file
+from tests.routes.route_campaign import SERIES, runs, tire, tire_file
 from tirelib.cli.common import plain
-from tirelib.identify.dynamic_pressure import dynamic_pressure
-from tirelib.identify.routes import Routes, follow_routes
-from tirelib.identify.routes_document import routes_document
 
 DAMPING = 0.08
 # two speeds, and five loads at one of them
@@ -90,3 +91,17 @@ def test_damping_names_its_law_and_the_ratio_of_the_other(document: dict[str, An
     modal = damping["modal"]["without_angle"]
     # the modal law damps bending and tension too: a several times smaller ratio, the same shift
     assert 0.1 * damping["value"] < modal["value"] < 0.5 * damping["value"]
+
+
+def test_the_program_prints_each_run_and_both_laws_of_damping(document: dict[str, Any]) -> None:
+    printed = list(lines(document))
+    table = printed[4:11]
+    assert [int(line.split()[0]) for line in table] == [
+        row["run"] for row in document["chapter_6"]["loads"]
+    ]
+    for line, load in zip(table, document["chapter_6"]["loads"], strict=True):
+        assert line.endswith(f"{load['corrected_percent']:+.1f}")
+    said = "\n".join(printed[11:])
+    modal = document["damping"]["modal"]["without_angle"]
+    for value in (document["damping"]["value"], modal["value"]):
+        assert f"{value:.3f}, 95 %" in said

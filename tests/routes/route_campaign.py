@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from routes.dynamic_route_damping import Law, damped_waveform
 
 from tirelib.arrays import FloatArray
 from tirelib.campaign import CampaignHeader, Tolerance
 from tirelib.campaign.model import TireGeometry
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
-from tirelib.identify.dynamic_route_damping import Law, damped_waveform
 from tirelib.model.base import large_displacements, operating_points, predict, values_of
 from tirelib.parameters import Number, Tire, TireFile, read_tire
 from tirelib.signal import LowPass

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from tests.unit.identify.route_campaign import SERIES, tire, turned, waves
-from tirelib.errors import CalibrationError, ShapeError
-from tirelib.identify.edges import (
+from routes.edges import (
     bias_curve,
     corrected,
     edge_bias,
     model_edges,
     read_edges,
 )
+
+from tests.routes.route_campaign import SERIES, tire, turned, waves
+from tirelib.errors import CalibrationError, ShapeError
 from tirelib.model.base import large_displacements, operating_points, values_of
 
 LOADS = np.array([1700.0, 3400.0, 5100.0, 6800.0])

@@ -31,14 +31,14 @@ from typing import Literal
 
 import numpy as np
 
+from routes.edges import EdgeReading, read_edges
+from routes.static_route_fit import Parameter, Quantity, fit_few
 from tirelib.arrays import FloatArray
 from tirelib.contact import radial, shear
 from tirelib.contact.shear_law import Shear
 from tirelib.contact.tread import Tread
 from tirelib.errors import CalibrationError, ParameterError
 from tirelib.identify.campaign_data import StraightRuns
-from tirelib.identify.edges import EdgeReading, read_edges
-from tirelib.identify.static_route_fit import Parameter, Quantity, fit_few
 from tirelib.model.base import operating_points, smoothed
 from tirelib.model.state import Operating, State
 from tirelib.ring.compliance import Compliance, compliance

@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from routes.dynamic_route import DynamicRoute, dynamic_route
+from routes.static_route import StaticRoute, static_route
+from routes.static_route_fit import Quantity
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import StraightRuns
-from tirelib.identify.dynamic_route import DynamicRoute, dynamic_route
-from tirelib.identify.static_route import StaticRoute, static_route
-from tirelib.identify.static_route_fit import Quantity
 from tirelib.parameters import TireFile
 
 

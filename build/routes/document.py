@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from routes.dynamic_pressure import ContactModel, PressureMap, dynamic_pressure
+from routes.dynamic_route import DynamicRoute
+from routes.dynamic_route_damping import Damping
+from routes.edges import Edges
+from routes.follow import Routes
+from routes.static_route import PressureShape, StaticRoute
+from routes.static_route_fit import Quantity
 from tirelib.errors import TirelibError
-from tirelib.identify.dynamic_pressure import ContactModel, PressureMap, dynamic_pressure
-from tirelib.identify.dynamic_route import DynamicRoute
-from tirelib.identify.dynamic_route_damping import Damping
-from tirelib.identify.edges import Edges
-from tirelib.identify.routes import Routes
-from tirelib.identify.static_route import PressureShape, StaticRoute
-from tirelib.identify.static_route_fit import Quantity
 
 DEG = 180.0 / np.pi
 _POINTS = 41

@@ -4,8 +4,17 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from routes.dynamic_pressure import dynamic_pressure
+from routes.dynamic_route import dynamic_route
+from routes.dynamic_route_damping import (
+    damped_compliance,
+    damped_waveform,
+    fit_damping,
+)
+from routes.dynamic_route_problem import DynamicOptions, pressure_levels
+from routes.dynamic_route_validation import rim_checks, vertical_stiffness
 
-from tests.unit.identify.route_campaign import (
+from tests.routes.route_campaign import (
     FIVE_LOADS,
     SERIES,
     SPEEDS,
@@ -18,15 +27,6 @@ from tests.unit.identify.route_campaign import (
 from tirelib.campaign import read_campaign
 from tirelib.errors import CalibrationError, ParameterError
 from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.dynamic_pressure import dynamic_pressure
-from tirelib.identify.dynamic_route import dynamic_route
-from tirelib.identify.dynamic_route_damping import (
-    damped_compliance,
-    damped_waveform,
-    fit_damping,
-)
-from tirelib.identify.dynamic_route_problem import DynamicOptions, pressure_levels
-from tirelib.identify.dynamic_route_validation import rim_checks, vertical_stiffness
 from tirelib.identify.identify import start_file
 from tirelib.model.base import operating_points, values_of
 from tirelib.rig.campaign import run_plan

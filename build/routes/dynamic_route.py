@@ -22,24 +22,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import CalibrationError, ConvergenceError, ParameterError
-from tirelib.identify.campaign_data import StraightRuns
-from tirelib.identify.dynamic_route_damping import Damping, fit_damping
-from tirelib.identify.dynamic_route_problem import (
+from routes.dynamic_route_damping import Damping, fit_damping
+from routes.dynamic_route_problem import (
     AS_PRINTED,
     LEAST_LOADS,
     DynamicOptions,
     DynamicProblem,
     LoadErrors,
 )
-from tirelib.identify.dynamic_route_validation import (
+from routes.dynamic_route_validation import (
     VerticalStiffness,
     predicted_deflection,
     vertical_stiffness,
 )
-from tirelib.identify.edges import Edges
-from tirelib.identify.static_route_fit import Quantity
+from routes.edges import Edges
+from routes.static_route_fit import Quantity
+from tirelib.arrays import FloatArray
+from tirelib.errors import CalibrationError, ConvergenceError, ParameterError
+from tirelib.identify.campaign_data import StraightRuns
 from tirelib.parameters import TireFile
 
 
