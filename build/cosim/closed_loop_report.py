@@ -10,9 +10,9 @@ from plotly.subplots import make_subplots
 from cosim.closed_loop import ROADS, BrakingRun, Outcome, Study
 from cosim.closed_loop_controller import SlipController
 from tirelib.arrays import FloatArray
-from tirelib.report.comparison import Part
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import Table, number
+from tirelib.report.parts_page import Part
 from tirelib.report.style import BLACK, BLUE, FAINT, GREEN, ORANGE
 
 LOOK = {

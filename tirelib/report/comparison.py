@@ -1,16 +1,8 @@
 """The page of a comparison: one self-contained HTML file; and the same in Markdown."""
 
-import base64
-import csv
-import io
-import json
-from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from tirelib.compare.force_curves import curves_of
 from tirelib.compare.forces import UNITS as FORCE_UNITS
@@ -26,10 +18,10 @@ from tirelib.report.comparison_tables import (
 )
 from tirelib.report.figures.compare_forces import curve_plots, force_plots, force_trends
 from tirelib.report.figures.compare_heat import gage_plots, heat_maps
-from tirelib.report.figures.compare_plot import Plot
 from tirelib.report.figures.compare_trends import set_point_plot, track_plots, trend_plots
 from tirelib.report.figures.compare_waveforms import waveform_plots
-from tirelib.report.page import Table, number, write_page
+from tirelib.report.page import Table, number
+from tirelib.report.parts_page import Part, write_parts_page
 from tirelib.report.style import millimetres
 
 SENTENCE_NOTE = (
@@ -55,18 +47,6 @@ BRUSH = (
     "Brush with a parabolic pressure, Eq. (3) to (5) of the dissertation as corrected; contact "
     "length from the ring.",
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """A part of the page."""
-
-    title: str
-    anchor: str
-    text: str = ""
-    tables: Sequence[Table] = ()
-    plots: Sequence[Plot] = ()
-    sources: Sequence[str] = field(default_factory=tuple)
 
 
 def answer_of(found: Comparison | ForceComparison) -> str:
@@ -138,64 +118,18 @@ def write_comparison(found: Comparison | ForceComparison, folder: Path) -> tuple
         If the folder cannot be written.
     """
     parts = force_parts(found) if isinstance(found, ForceComparison) else strain_parts(found)
-    title = f"Model against measurement: {found.quantity}"
-    shown = [Shown.of(plot) for part in parts for plot in part.plots]
-    figures = "{" + ",".join(f"{json.dumps(s.name)}:{s.json}" for s in shown) + "}"
-    by_name = {s.name: s for s in shown}
-    views = [
-        {
-            "title": part.title,
-            "anchor": part.anchor,
-            "text": part.text,
-            "tables": part.tables,
-            "plots": [by_name[plot.name] for plot in part.plots],
-            "sources": part.sources,
-        }
-        for part in parts
-    ]
-    page = write_page(
+    return write_parts_page(
         folder,
-        "comparison.html",
-        title=title,
-        sections=(),
-        parts=views,
+        "index",
+        parts,
+        words="comparison",
+        title=f"Model against measurement: {found.quantity}",
         summary=summary_of(found),
         answer=answer_of(found),
         messages=found.messages,
         sentences=found.sentences,
         sentence_note=SENTENCE_NOTE,
-        lines=(),
-        links=(),
-        commands=(),
-        plotly=Markup(get_plotlyjs()),
-        figures=Markup(figures.replace("</", "<\\/")),
     )
-    words = folder / "comparison.md"
-    words.write_text(markdown(found, parts, title), encoding="utf-8")
-    return page, words
-
-
-@dataclass(frozen=True, slots=True)
-class Shown:
-    """A plot as the template takes it."""
-
-    name: str
-    title: str
-    caption: str
-    height: int
-    json: str
-    csv: str
-
-    @classmethod
-    def of(cls, plot: Plot) -> "Shown":
-        """Return the plot with its data ready for the page."""
-        text = io.StringIO()
-        writer = csv.writer(text)
-        writer.writerow(plot.columns)
-        writer.writerows(plot.rows)
-        data = base64.b64encode(text.getvalue().encode()).decode()
-        height = int(plot.figure.layout.height)
-        return cls(plot.name, plot.title, plot.caption, height, str(plot.figure.to_json()), data)
 
 
 def summary_of(found: Comparison | ForceComparison) -> str:
@@ -286,46 +220,3 @@ def _bibliography(found: Comparison) -> list[str]:
     base = RING if found.model.large else RING[:1]
     effects = [f"{u.effect.name}: {u.effect.source}" for u in found.model.used]
     return [*effects, *base, *METHOD]
-
-
-def markdown(found: Comparison | ForceComparison, parts: Sequence[Part], title: str) -> str:
-    """Return the page's words and tables as Markdown."""
-    lines = [f"# {title}", "", summary_of(found), "", f"**{answer_of(found)}**", ""]
-    lines += [f"> {message}\n" for message in found.messages]
-    if found.sentences:
-        lines += [
-            "## Lack of fit",
-            "",
-            *(f"- {text}" for text in found.sentences),
-            "",
-            SENTENCE_NOTE,
-            "",
-        ]
-    return "\n".join([*lines, *markdown_parts(parts)]).rstrip() + "\n"
-
-
-def markdown_parts(parts: Sequence[Part]) -> list[str]:
-    """Return words, tables and sources of a page's parts as lines of Markdown."""
-    lines: list[str] = []
-    for part in parts:
-        if not (part.text or part.tables or part.sources):
-            continue
-        lines += [f"## {part.title}", ""]
-        if part.text:
-            lines += [part.text, ""]
-        for table in part.tables:
-            lines += markdown_table(table)
-        lines += [f"- {source}" for source in part.sources]
-        lines.append("")
-    return lines
-
-
-def markdown_table(table: Table) -> list[str]:
-    """Return a table as lines of Markdown."""
-    head = "| " + " | ".join(table.columns) + " |"
-    rule = "|" + "|".join("---" if k < table.texts else "---:" for k in range(len(table.columns)))
-    rows = [
-        "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in table.rows
-    ]
-    note = [table.note, ""] if table.note else []
-    return [f"**{table.title}**", "", head, rule + "|", *rows, "", *note]

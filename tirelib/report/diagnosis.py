@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 from tirelib.diagnose.document import Assessment, exceeds, next_test
 from tirelib.diagnose.held_out import pooled
 from tirelib.diagnose.left import Left, left_of
-from tirelib.report.comparison import METHOD, RING, Part
+from tirelib.report.comparison import METHOD, RING
 from tirelib.report.figures.compare_plot import (
     ANGLE_TITLE,
     DIVERGING,
@@ -21,7 +21,7 @@ from tirelib.report.figures.compare_plot import (
 from tirelib.report.figures.waterfall import waterfall_of
 from tirelib.report.findings import advice, dead_effects, score_bars
 from tirelib.report.page import Table, number
-from tirelib.report.parts_page import write_parts_page
+from tirelib.report.parts_page import Part, write_parts_page
 from tirelib.waveforms import GRID
 
 TITLE = "Which effect is missing"

@@ -4,12 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tirelib.report.comparison import Part
 from tirelib.report.explanation import error_line, fold_name, said_strength
 from tirelib.report.figures.waterfall import waterfall_of
 from tirelib.report.journey import WORDS, part_errors, run_errors
 from tirelib.report.page import Table, number
-from tirelib.report.parts_page import write_parts_page
+from tirelib.report.parts_page import Part, write_parts_page
 
 
 def write_extension(told: Mapping[str, Any], folder: Path) -> tuple[Path, Path]:

@@ -9,13 +9,13 @@ from tirelib.diagnose.forces.assess import ForceAssessment
 from tirelib.diagnose.forces.document import exceeds, fold_words, next_test
 from tirelib.diagnose.forces.held_out import pooled
 from tirelib.diagnose.forces.search import ALARM
-from tirelib.report.comparison import BRUSH, Part
+from tirelib.report.comparison import BRUSH
 from tirelib.report.figures.compare_plot import Plot
 from tirelib.report.figures.force_left import residual_map
 from tirelib.report.figures.waterfall import Step, waterfall, waterfall_of
 from tirelib.report.findings import advice, dead_effects, score_bars
 from tirelib.report.page import Table, number
-from tirelib.report.parts_page import write_parts_page
+from tirelib.report.parts_page import Part, write_parts_page
 
 METHOD_TEXT = (
     "All effects of the brush are fitted together. An effect's score is the misfit that returns "

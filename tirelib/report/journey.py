@@ -12,7 +12,6 @@ from plotly.subplots import make_subplots
 from tirelib.compare.force_curves import Curve, curves_of, ranked, slip_of
 from tirelib.compare.forces import UNITS, ForceComparison
 from tirelib.compare.strain import Comparison
-from tirelib.report.comparison import Part
 from tirelib.report.explanation import fold_name, titled
 from tirelib.report.figures.compare_forces import force_plots
 from tirelib.report.figures.compare_heat import DEGREES, heat_maps
@@ -20,7 +19,7 @@ from tirelib.report.figures.compare_plot import ANGLE_TITLE, Plot, styled_figure
 from tirelib.report.figures.compare_waveforms import HALF
 from tirelib.report.figures.waterfall import waterfall_of
 from tirelib.report.page import Table, number
-from tirelib.report.parts_page import write_parts_page
+from tirelib.report.parts_page import Part, write_parts_page
 from tirelib.report.style import BLUE, FAINT, INK, RED
 
 TITLE = "What the model lacked"

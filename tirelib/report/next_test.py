@@ -10,10 +10,9 @@ from tirelib.arrays import FloatArray
 from tirelib.planning.criterion import NOTHING, RESOLVED, NextTest, PairForecast
 from tirelib.planning.document import Plan, advice, plan_document
 from tirelib.planning.envelope import AXES
-from tirelib.report.comparison import Part
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import Table, number
-from tirelib.report.parts_page import write_parts_page
+from tirelib.report.parts_page import Part, write_parts_page
 from tirelib.report.style import BLUE, FAINT, RED
 
 TITLE = "Which run to measure next"
