@@ -56,21 +56,20 @@ def sector_tables(found: Comparison) -> list[Table]:
     for by in names:
         cells = [cell for cell in found.table if cell.by == by]
         cells.sort(key=lambda c: (np.nan_to_num(c.value), SECTORS.index(c.sector)))
-        rows = [_row(cell, factor) for cell in cells]
         title = "All straight, freely rolling runs" if by == "all" else f"By {CONDITIONS[by]}"
         out.append(
-            Table(
+            Table.of(
                 title,
-                [
-                    "level",
-                    "sector",
-                    "runs",
-                    f"rms [{unit}]",
-                    "rms [microstrain]",
-                    "mean [microstrain]",
-                    "95 % \u00b1 [microstrain]",
-                ],
-                rows,
+                cells,
+                {
+                    "level": lambda c: "all" if c.by == "all" else told(c.by, c.value),
+                    "sector": lambda c: c.sector,
+                    "runs": lambda c: str(c.runs),
+                    f"rms [{unit}]": lambda c: number(factor * c.rms, 3),
+                    "rms [microstrain]": lambda c: number(1e6 * c.rms, 4),
+                    "mean [microstrain]": lambda c: number(1e6 * c.mean, 4),
+                    "95 % \u00b1 [microstrain]": lambda c: number(1.96e6 * c.std, 2),
+                },
                 texts=2,
                 folded=by != "all",
                 note="Model minus measurement; a positive mean is too much tension.",
@@ -79,47 +78,24 @@ def sector_tables(found: Comparison) -> list[Table]:
     return out
 
 
-def _row(cell: Cell, factor: float) -> list[str]:
-    level = "all" if cell.by == "all" else told(cell.by, cell.value)
-    return [
-        level,
-        cell.sector,
-        str(cell.runs),
-        number(factor * cell.rms, 3),
-        number(1e6 * cell.rms, 4),
-        number(1e6 * cell.mean, 4),
-        number(1.96e6 * cell.std, 2),
-    ]
-
-
 def gage_tables(found: Comparison) -> list[Table]:
     """Return every gage's noise and rms, and its mean difference in every sector."""
     gages = sorted(found.gages, key=lambda g: -g.lateral)
-    rows = [
-        [
-            millimeters(g.lateral),
-            str(g.number + 1),
-            number(1e6 * g.noise.std, 3),
-            number(1e6 * g.rms, 4),
-            number(g.rms / g.noise.std, 4),
-        ]
-        for g in gages
-    ]
     cells = [{cell.sector: cell for cell in gage.table} for gage in gages]
     means = [
         [name, *(_mean(cell[name]) if name in cell else "" for cell in cells)] for name in SECTORS
     ]
     return [
-        Table(
+        Table.of(
             "Difference at each gage, straight and freely rolling runs",
-            [
-                "y (ISO 8855)",
-                "gage",
-                "noise [microstrain]",
-                "rms [microstrain]",
-                "rms [noise of the gage]",
-            ],
-            rows,
+            gages,
+            {
+                "y (ISO 8855)": lambda g: millimeters(g.lateral),
+                "gage": lambda g: str(g.number + 1),
+                "noise [microstrain]": lambda g: number(1e6 * g.noise.std, 3),
+                "rms [microstrain]": lambda g: number(1e6 * g.rms, 4),
+                "rms [noise of the gage]": lambda g: number(g.rms / g.noise.std, 4),
+            },
             note="y is positive to the left; corrected for set points.",
         ),
         Table(
@@ -139,39 +115,22 @@ def _mean(cell: Cell) -> str:
 
 def track_table(found: Comparison) -> Table:
     """Return contact length, deflection, entry and exit: how far model and measurement differ."""
-    rows = []
-    for track in found.tracks:
-        fit, scale = track_fit(track, found.chosen.straight), track.scale
-        rows.append(
-            [
-                f"{track.name} [{track.unit}]",
-                str(fit.runs),
-                number(scale * track.noise, 2),
-                number(scale * fit.mean, 3),
-                number(1.96 * scale * fit.std, 2),
-                number(scale * fit.rms, 3),
-                number(track.in_noise(fit.rms), 3),
-                number(scale * fit.rms_beside, 3),
-            ]
-        )
-    note = (
-        "Model minus measurement. No number is corrected for a constant offset of the campaign; "
-        "the last column is the rms that remains after such a correction."
-    )
-    return Table(
+    fits = [(track, track_fit(track, found.chosen.straight)) for track in found.tracks]
+    return Table.of(
         "Counted runs",
-        [
-            "",
-            "runs",
-            "noise of a run",
-            "mean",
-            "95 % \u00b1",
-            "rms",
-            "rms [noise]",
-            "rms about the mean",
-        ],
-        rows,
-        note=note,
+        fits,
+        {
+            "": lambda of: f"{of[0].name} [{of[0].unit}]",
+            "runs": lambda of: str(of[1].runs),
+            "noise of a run": lambda of: number(of[0].scale * of[0].noise, 2),
+            "mean": lambda of: number(of[0].scale * of[1].mean, 3),
+            "95 % \u00b1": lambda of: number(1.96 * of[0].scale * of[1].std, 2),
+            "rms": lambda of: number(of[0].scale * of[1].rms, 3),
+            "rms [noise]": lambda of: number(of[0].in_noise(of[1].rms), 3),
+            "rms about the mean": lambda of: number(of[0].scale * of[1].rms_beside, 3),
+        },
+        note="Model minus measurement. No number is corrected for a constant offset of the "
+        "campaign; the last column is the rms that remains after such a correction.",
     )
 
 
@@ -219,42 +178,30 @@ def force_tables(found: ForceComparison, curves: tuple[Curve, ...]) -> tuple[Tab
             [f"rms measured [{unit}]", number(found.measured_rms, 4)],
         ],
     )
-    rows = [
-        [
-            CONDITIONS.get(cell.by, "all points"),
-            range_of(cell),
-            str(cell.points),
-            number(cell.rms, 3),
-            number(cell.rms / found.noise, 3),
-            number(cell.mean, 3),
-            number(cell.excess, 3),
-            number(1.96 * cell.excess_std, 2),
-        ]
-        for cell in found.table
-    ]
-    table = Table(
+    table = Table.of(
         "Difference, model minus measurement (slips by magnitude)",
-        [
-            "by",
-            "range",
-            "points",
-            f"rms [{unit}]",
-            "rms [noise]",
-            f"mean [{unit}]",
-            f"magnitude too large by [{unit}]",
-            f"95 % \u00b1 [{unit}]",
-        ],
-        rows,
+        found.table,
+        {
+            "by": lambda cell: CONDITIONS.get(cell.by, "all points"),
+            "range": range_of,
+            "points": lambda cell: str(cell.points),
+            f"rms [{unit}]": lambda cell: number(cell.rms, 3),
+            "rms [noise]": lambda cell: number(cell.rms / found.noise, 3),
+            f"mean [{unit}]": lambda cell: number(cell.mean, 3),
+            f"magnitude too large by [{unit}]": lambda cell: number(cell.excess, 3),
+            f"95 % \u00b1 [{unit}]": lambda cell: number(1.96 * cell.excess_std, 2),
+        },
         texts=2,
     )
-    each = [
-        [curve.words, str(curve.points), number(curve.rms, 3), number(curve.rms / found.noise, 3)]
-        for curve in curves
-    ]
-    listed = Table(
+    listed = Table.of(
         "Curves, the best first",
-        ["set point", "points", f"rms [{unit}]", "rms [noise]"],
-        each,
-        folded=len(each) > 8,
+        curves,
+        {
+            "set point": lambda curve: curve.words,
+            "points": lambda curve: str(curve.points),
+            f"rms [{unit}]": lambda curve: number(curve.rms, 3),
+            "rms [noise]": lambda curve: number(curve.rms / found.noise, 3),
+        },
+        folded=len(curves) > 8,
     )
     return noise, table, listed

@@ -20,7 +20,7 @@ from tirelib.report.figures.compare_plot import (
 )
 from tirelib.report.figures.waterfall import waterfall_of
 from tirelib.report.findings import advice, dead_effects, score_bars
-from tirelib.report.page import Table, number
+from tirelib.report.page import Table, number, numbers
 from tirelib.report.parts_page import Part, write_parts_page
 from tirelib.waveforms import GRID
 
@@ -129,46 +129,29 @@ def _unit(told: Assessment) -> str:
     return "noise" if told.after.known else "microstrain"
 
 
-def _strength(values: Sequence[float] | np.ndarray) -> str:
-    return ", ".join(number(float(x), 3) for x in values)
-
-
 def _candidates(told: Assessment) -> Table:
     unit = _unit(told)
-    rows = [
-        [
-            f.effect.name,
-            f.level,
-            "yes" if f.in_range else "no",
-            ", ".join(f"{twin} {np.rad2deg(angle):.0f}\u00b0" for twin, angle in f.twins),
-            number(f.score / f.threshold, 3),
-            number(f.p, 2),
-            _strength(f.strength),
-            _strength(f.std),
-            f.effect.unit,
-            number(told.error_with(f), 3),
-            number(pooled(told.held_after.get(f.effect.name, ()), told.folds), 3),
-            number(f.power, 2),
-        ]
-        for f in told.findings
-    ]
-    return Table(
+    return Table.of(
         "Effects by rank",
-        [
-            "effect",
-            "level",
-            "in range",
-            "twins (angle)",
-            "score / threshold",
-            "p",
-            "strength",
-            "std",
-            "unit",
-            f"error with it [{unit}]",
-            f"held out [{unit}]",
-            "power",
-        ],
-        rows,
+        told.findings,
+        {
+            "effect": lambda f: f.effect.name,
+            "level": lambda f: f.level,
+            "in range": lambda f: "yes" if f.in_range else "no",
+            "twins (angle)": lambda f: ", ".join(
+                f"{twin} {np.rad2deg(angle):.0f}\u00b0" for twin, angle in f.twins
+            ),
+            "score / threshold": lambda f: number(f.score / f.threshold, 3),
+            "p": lambda f: number(f.p, 2),
+            "strength": lambda f: numbers(f.strength),
+            "std": lambda f: numbers(f.std),
+            "unit": lambda f: f.effect.unit,
+            f"error with it [{unit}]": lambda f: number(told.error_with(f), 3),
+            f"held out [{unit}]": lambda f: number(
+                pooled(told.held_after.get(f.effect.name, ()), told.folds), 3
+            ),
+            "power": lambda f: number(f.power, 2),
+        },
         texts=4,
         note="Twins: effects whose signatures are less than 30 degrees apart. Power: chance that "
         "a third of the range has a score beyond the threshold. Errors with "

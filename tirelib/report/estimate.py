@@ -1,5 +1,7 @@
 """The report of a campaign that was estimated with a calibration."""
 
+from collections.abc import Callable
+from math import isnan
 from pathlib import Path
 
 from tirelib.estimators.calibration import Calibration, Estimates
@@ -74,43 +76,32 @@ def accuracy_table(
     rows: list[Accuracy], title: str = "Accuracy against the rig", names: list[str] | None = None
 ) -> Table:
     """Return the accuracy table; `names` adds a first column, the campaign of each row."""
-    columns = [
-        "quantity",
-        "unit",
-        "rmse",
-        "% of range",
-        "R\u00b2",
-        "turns in 95 % interval",
-        "runs",
-        "valid turns",
-        "measured turns",
-    ]
-    cells = [
-        [
-            row.title,
-            row.unit,
-            number(row.rmse),
-            f"{row.percent_of_range:.2f}" if row.percent_of_range == row.percent_of_range else DASH,
-            f"{row.r2:.5f}" if row.r2 == row.r2 else DASH,
-            f"{100.0 * row.coverage:.0f} %",
-            str(row.runs),
-            str(row.turns),
-            str(row.turns_measured),
-        ]
-        for row in rows
-    ]
-    if names is not None:
-        columns = ["campaign", *columns]
-        cells = [[name, *row] for name, row in zip(names, cells, strict=True)]
-    return Table(
+    named = list(zip(names or [""] * len(rows), rows, strict=True))
+    first: dict[str, Callable[[tuple[str, Accuracy]], str]] = {"campaign": lambda of: of[0]}
+    return Table.of(
         title,
-        columns,
-        cells,
+        named,
+        {
+            **(first if names is not None else {}),
+            "quantity": lambda of: of[1].title,
+            "unit": lambda of: of[1].unit,
+            "rmse": lambda of: number(of[1].rmse),
+            "% of range": lambda of: _known(of[1].percent_of_range, 2),
+            "R\u00b2": lambda of: _known(of[1].r2, 5),
+            "turns in 95 % interval": lambda of: f"{100.0 * of[1].coverage:.0f} %",
+            "runs": lambda of: str(of[1].runs),
+            "valid turns": lambda of: str(of[1].turns),
+            "measured turns": lambda of: str(of[1].turns_measured),
+        },
         texts=2 if names is None else 3,
         note="Errors refer to the mean of a run's valid turns (in a sweep to each turn); the "
         "share in the 95 % interval refers to single turns. A dash: the quantity was not varied, "
         "so that a percentage of its range is meaningless.",
     )
+
+
+def _known(value: float, decimals: int) -> str:
+    return DASH if isnan(value) else f"{value:.{decimals}f}"
 
 
 def _validity(estimates: Estimates, calibration: Calibration) -> Table:

@@ -102,40 +102,29 @@ def _link(page: str, text: str) -> Markup:
 
 def _parameters(parameters: Sequence[Mapping[str, Any]]) -> Part:
     plots = [_parameter_plot(index, each) for index, each in enumerate(parameters)]
-    odd = [
-        [
-            _link(point["page"], point["tire"]),
-            point["campaign"],
-            each["name"],
-            each["unit"],
-            number(point["value"]),
-            number(point["low"]),
-            number(point["high"]),
-            number(each["centre"]),
-            f"{point['score']:+.1f}",
-        ]
-        for each in parameters
-        for point in each["points"]
-        if point["outlier"]
-    ]
-    columns = (
-        "tire",
-        "campaign",
-        "parameter",
-        "unit",
-        "value",
-        "95 % from",
-        "to",
-        "mean of the others",
-        "distance in std",
+    odd = [{**each, **p} for each in parameters for p in each["points"] if p["outlier"]]
+    table = Table.of(
+        "Tires that stand out",
+        odd,
+        {
+            "tire": lambda row: _link(row["page"], row["tire"]),
+            "campaign": lambda row: row["campaign"],
+            "parameter": lambda row: row["name"],
+            "unit": lambda row: row["unit"],
+            "value": lambda row: number(row["value"]),
+            "95 % from": lambda row: number(row["low"]),
+            "to": lambda row: number(row["high"]),
+            "mean of the others": lambda row: number(row["centre"]),
+            "distance in std": lambda row: f"{row['score']:+.1f}",
+        },
+        texts=4,
     )
-    tables = [Table("Tires that stand out", columns, odd, texts=4)] if odd else []
     text = (
         "Points are campaigns with 95 % intervals; the band is the mean of the tires with "
         "twice the scatter between them. Orange: farther from the others than interval and "
         "scatter explain (on one page in fifteen by chance). A click on a point opens its page."
     )
-    return Part("Parameters over the tires", "parameters", text, tables, plots)
+    return Part("Parameters over the tires", "parameters", text, [table] if odd else [], plots)
 
 
 def _parameter_plot(index: int, each: Mapping[str, Any]) -> Plot:
@@ -182,33 +171,22 @@ def _parameter_plot(index: int, each: Mapping[str, Any]) -> Plot:
 
 
 def _changes(changes: Sequence[Mapping[str, Any]]) -> Part:
-    rows = [
-        [
-            _link(each["pages"][-1], each["tire"]),
-            each["wheel"] or DASH,
-            each["channel"],
-            each["unit"],
-            each["cause"],
-            str(len(each["values"])),
-            number(each["change"], 3),
-            number(each["per_day"], 3),
-            f"{each['p']:.1g}",
-        ]
-        for each in changes
-        if each["changes"]
-    ]
-    columns = (
-        "tire",
-        "wheel",
-        "channel",
-        "unit",
-        "what it may be",
-        "recordings",
-        "change",
-        "a day",
-        "chance",
+    table = Table.of(
+        "Changes",
+        [each for each in changes if each["changes"]],
+        {
+            "tire": lambda each: _link(each["pages"][-1], each["tire"]),
+            "wheel": lambda each: each["wheel"] or DASH,
+            "channel": lambda each: each["channel"],
+            "unit": lambda each: each["unit"],
+            "what it may be": lambda each: each["cause"],
+            "recordings": lambda each: str(len(each["values"])),
+            "change": lambda each: number(each["change"], 3),
+            "a day": lambda each: number(each["per_day"], 3),
+            "chance": lambda each: f"{each['p']:.1g}",
+        },
+        texts=5,
     )
-    tables = [Table("Changes", columns, rows, texts=5)] if rows else []
     by_channel: dict[str, list[Mapping[str, Any]]] = {}
     for each in changes:
         if len(each["values"]) > 1:
@@ -218,7 +196,7 @@ def _changes(changes: Sequence[Mapping[str, Any]]) -> Part:
         "Means of recordings over time, a line for each tire and wheel. Orange: steeper than "
         "the scatter about it explains; for the rolling radius pressure and load are taken out."
     )
-    return Part("Changes with time", "changes", text, tables, plots)
+    return Part("Changes with time", "changes", text, [table] if table.rows else [], plots)
 
 
 def _change_plot(channel: str, series: Sequence[Mapping[str, Any]]) -> Plot:
@@ -290,96 +268,92 @@ def _effects(effects: Sequence[Mapping[str, Any]]) -> Part:
                 rows,
             )
         )
-    rows = [
-        [
-            _link(each["page"], each["tire"]),
-            each["campaign"],
-            each["quantity"],
-            each["verdict"],
-            ", ".join(each["named"]) or DASH,
-            ", ".join(each["hints"]) or DASH,
-        ]
-        for each in effects[:MOST_ROWS]
-    ]
-    columns = ("tire", "campaign", "quantity", "verdict", "named", "hints")
-    tables = [Table("Verdicts", columns, rows, texts=6)] if rows else []
-    return Part("Effects by tire", "effects", "", tables, plots)
+    table = Table.of(
+        "Verdicts",
+        effects[:MOST_ROWS],
+        {
+            "tire": lambda each: _link(each["page"], each["tire"]),
+            "campaign": lambda each: each["campaign"],
+            "quantity": lambda each: each["quantity"],
+            "verdict": lambda each: each["verdict"],
+            "named": lambda each: ", ".join(each["named"]) or DASH,
+            "hints": lambda each: ", ".join(each["hints"]) or DASH,
+        },
+        texts=6,
+    )
+    return Part("Effects by tire", "effects", "", [table] if table.rows else [], plots)
 
 
 def _joined(parameters: Sequence[Mapping[str, Any]]) -> Part:
-    rows = [
-        [
-            _link(row["page"], row["tire"]),
-            each["name"],
-            each["unit"],
-            str(row["campaigns"]),
-            number(row["own"]),
-            number(row["own_std"], 3),
-            number(row["value"]),
-            number(row["low"]),
-            number(row["high"]),
-            f"{row['gain']:.2f}",
-        ]
-        for each in parameters
-        for row in each["joined"]
-    ]
-    rows.sort(key=lambda row: -float(row[-1]))
-    columns = (
-        "tire",
-        "parameter",
-        "unit",
-        "campaigns",
-        "alone",
-        "std alone",
-        "joined",
-        "95 % from",
-        "to",
-        "gain",
-    )
+    rows = [{**each, **row} for each in parameters for row in each["joined"]]
+    rows.sort(key=lambda row: -round(row["gain"], 2))
     note = (
         "gain: standard deviation alone over that after the join; its square is how many times the "
         "runs it is worth. Tires that stand out are not joined."
     )
-    tables = [
-        Table(
-            "Joined numbers", columns, rows[:MOST_ROWS], texts=3, note=note, folded=len(rows) > 40
-        )
-    ]
+    table = Table.of(
+        "Joined numbers",
+        rows[:MOST_ROWS],
+        {
+            "tire": lambda row: _link(row["page"], row["tire"]),
+            "parameter": lambda row: row["name"],
+            "unit": lambda row: row["unit"],
+            "campaigns": lambda row: str(row["campaigns"]),
+            "alone": lambda row: number(row["own"]),
+            "std alone": lambda row: number(row["own_std"], 3),
+            "joined": lambda row: number(row["value"]),
+            "95 % from": lambda row: number(row["low"]),
+            "to": lambda row: number(row["high"]),
+            "gain": lambda row: f"{row['gain']:.2f}",
+        },
+        texts=3,
+        note=note,
+        folded=len(rows) > 40,
+    )
     text = (
         "Tires of one size are one population: a tire with few runs borrows from its siblings, as "
         "far as these scatter less than its own interval is wide."
     )
-    return Part("Joined tires", "joined", text, tables if rows else [])
+    return Part("Joined tires", "joined", text, [table] if rows else [])
 
 
 def _failures(failures: Sequence[Mapping[str, Any]]) -> Part:
-    rows = [
-        [
-            each["task"],
-            each["cause"],
-            each["message"].splitlines()[0][:160],
-            ", ".join(path.rpartition("/")[2] for path in each["paths"][:3])
-            + (", ..." if len(each["paths"]) > 3 else ""),
-            str(each["number"]),
-        ]
-        for each in failures[:MOST_ROWS]
-    ]
-    columns = ("task", "cause", "first message", "where", "number")
-    tables = [Table("Failures by cause", columns, rows, texts=4)] if rows else []
+    table = Table.of(
+        "Failures by cause",
+        failures[:MOST_ROWS],
+        {
+            "task": lambda each: each["task"],
+            "cause": lambda each: each["cause"],
+            "first message": lambda each: each["message"].splitlines()[0][:160],
+            "where": lambda each: (
+                ", ".join(path.rpartition("/")[2] for path in each["paths"][:3])
+                + (", ..." if len(each["paths"]) > 3 else "")
+            ),
+            "number": lambda each: str(each["number"]),
+        },
+        texts=4,
+    )
+    tables = [table] if table.rows else []
     return Part("Failures", "failures", "The same command tries them again.", tables)
 
 
 def _containers(containers: Sequence[Mapping[str, Any]]) -> Part:
-    rows = [
-        [_link(row["page"], row["name"]), row["tire"], row["task"], row["file_path"]]
-        for row in containers[:MOST_ROWS]
-    ]
     note = (
         f"The first {MOST_ROWS} of {len(containers)}; the table container_metrics has all."
         if len(containers) > MOST_ROWS
         else ""
     )
-    table = Table(
-        "Pages of all", ("campaign", "tire", "task", "path"), rows, texts=4, note=note, folded=True
+    table = Table.of(
+        "Pages of all",
+        containers[:MOST_ROWS],
+        {
+            "campaign": lambda row: _link(row["page"], row["name"]),
+            "tire": lambda row: row["tire"],
+            "task": lambda row: row["task"],
+            "path": lambda row: row["file_path"],
+        },
+        texts=4,
+        note=note,
+        folded=True,
     )
-    return Part("Campaigns and recordings", "containers", "", [table] if rows else [])
+    return Part("Campaigns and recordings", "containers", "", [table] if table.rows else [])

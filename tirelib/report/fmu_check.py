@@ -1,6 +1,5 @@
 """The page of ``tirelib fmu check``: what was tried, what came out, where it differs."""
 
-import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -112,30 +111,22 @@ def _facts(document: Document) -> Table:
 
 
 def _variables(document: Document) -> Table:
-    rows = [
-        [
-            row["name"],
-            row["unit"],
-            "as expected" if row["passed"] else "DIFFERS",
-            number(_known(row["largest_difference"]), 2),
-            number(row["allowed"], 2),
-            number(row["magnitude"]),
-            number(row["time"]),
-        ]
-        for row in document["variables"]
-    ]
-    return Table(
+    return Table.of(
         "Largest difference of every output",
-        ["output", "unit", "result", "difference", "allowed", "magnitude", "at [s]"],
-        rows,
+        document["variables"],
+        {
+            "output": lambda row: row["name"],
+            "unit": lambda row: row["unit"],
+            "result": lambda row: "as expected" if row["passed"] else "DIFFERS",
+            "difference": lambda row: number(row["largest_difference"], 2),
+            "allowed": lambda row: number(row["allowed"], 2),
+            "magnitude": lambda row: number(row["magnitude"]),
+            "at [s]": lambda row: number(row["time"]),
+        },
         texts=3,
         note=f"Allowed: {document['tolerance']:g} of the largest magnitude of the output. A dash: "
         "the output has a number where the reference has none, or the reverse.",
     )
-
-
-def _known(value: float | None) -> float:
-    return math.nan if value is None else value
 
 
 @styled

@@ -118,21 +118,17 @@ def parts_of(journey: Journey) -> list[Part]:
 def _table(journey: Journey) -> Table:
     told = journey.document
     unit = WORDS.get(told["error_unit"], told["error_unit"])
-    rows = [
-        [
-            step["model"],
-            step["what"],
-            number(step["error"], 3),
-            number(step["heldout_error"], 3),
-            number(step["residual_rms_raw"], 3),
-        ]
-        for step in told["steps"]
-    ]
     raw = WORDS.get(told["residual_rms_unit"], told["residual_rms_unit"])
-    return Table(
+    return Table.of(
         "The models",
-        ["model", "what it has", f"error [{unit}]", f"held out [{unit}]", f"rms left [{raw}]"],
-        rows,
+        told["steps"],
+        {
+            "model": lambda step: step["model"],
+            "what it has": lambda step: step["what"],
+            f"error [{unit}]": lambda step: number(step["error"], 3),
+            f"held out [{unit}]": lambda step: number(step["heldout_error"], 3),
+            f"rms left [{raw}]": lambda step: number(step["residual_rms_raw"], 3),
+        },
         texts=2,
         note="Held out: the error on runs that were not used in the fit.",
     )
@@ -142,13 +138,19 @@ def _held_out(journey: Journey) -> list[Table]:
     """Return what was held out of the fits, of the first model and of the last."""
     told = journey.document
     unit = WORDS.get(told["error_unit"], told["error_unit"])
-    rows = [
-        [fold_name(fold), number(fold["error_before"], 3), number(fold["error_after"], 3)]
-        for fold in told["held_out"]
-    ]
-    if not rows:
+    if not told["held_out"]:
         return []
-    return [Table("Held out of the fit", ["held out", f"before [{unit}]", f"after [{unit}]"], rows)]
+    return [
+        Table.of(
+            "Held out of the fit",
+            told["held_out"],
+            {
+                "held out": fold_name,
+                f"before [{unit}]": lambda fold: number(fold["error_before"], 3),
+                f"after [{unit}]": lambda fold: number(fold["error_after"], 3),
+            },
+        )
+    ]
 
 
 def part_errors(told: Mapping[str, Any]) -> list[Plot]:

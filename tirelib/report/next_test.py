@@ -11,7 +11,7 @@ from tirelib.planning.criterion import NOTHING, RESOLVED, NextTest, PairForecast
 from tirelib.planning.document import Plan, advice, plan_document
 from tirelib.planning.envelope import AXES
 from tirelib.report.figures.compare_plot import Plot, styled_figure
-from tirelib.report.page import Table, number
+from tirelib.report.page import Table, number, numbers
 from tirelib.report.parts_page import Part, write_parts_page
 from tirelib.report.style import BLUE, FAINT, RED
 
@@ -284,41 +284,31 @@ def _row(test: NextTest, pair: PairForecast, k: int) -> list[float]:
 
 
 def _suspects(test: NextTest) -> Table:
-    rows = [
-        [
-            rival.name.replace(NOTHING, "no effect"),
-            "yes" if rival.in_range else "no",
-            ", ".join(number(float(x), 3) for x in rival.strength),
-            number(rival.cost, 4),
-        ]
-        for rival in test.trial.rivals
-    ]
-    return Table("Suspects", ["suspect", "in range", "strength", "chi-square left"], rows, texts=2)
+    return Table.of(
+        "Suspects",
+        test.trial.rivals,
+        {
+            "suspect": lambda rival: rival.name.replace(NOTHING, "no effect"),
+            "in range": lambda rival: "yes" if rival.in_range else "no",
+            "strength": lambda rival: numbers(rival.strength),
+            "chi-square left": lambda rival: number(rival.cost, 4),
+        },
+        texts=2,
+    )
 
 
 def _pairs(test: NextTest) -> Table:
-    rows = [
-        [
-            _said(pair),
-            pair.better.replace(NOTHING, "no effect"),
-            "yes" if pair.resolved else "no",
-            number(abs(pair.gap), 3),
-            number(float(pair.separation[0]), 3),
-            number(100.0 * float(pair.probability[0]), 2),
-        ]
-        for pair in test.pairs
-    ]
-    return Table(
+    return Table.of(
         "Pairs",
-        [
-            "pair",
-            "better now",
-            "resolved now",
-            "chi-square apart now",
-            "advised run adds",
-            "chance [%]",
-        ],
-        rows,
+        test.pairs,
+        {
+            "pair": _said,
+            "better now": lambda pair: pair.better.replace(NOTHING, "no effect"),
+            "resolved now": lambda pair: "yes" if pair.resolved else "no",
+            "chi-square apart now": lambda pair: number(abs(pair.gap), 3),
+            "advised run adds": lambda pair: number(float(pair.separation[0]), 3),
+            "chance [%]": lambda pair: number(100.0 * float(pair.probability[0]), 2),
+        },
         texts=3,
     )
 
@@ -366,24 +356,19 @@ def _repeat_tables(plan: Plan, test: NextTest) -> list[Table]:
     of_plan = plan_document(plan)["repeats"]["of_plan"]
     if not of_plan:
         return []
-    rows = [
-        [
-            name,
-            number(entry["gain_now"], 3),
-            number(entry["gain_limit"], 3),
-            str(entry["times"] or "never"),
-        ]
-        for name, entry in of_plan.items()
-    ]
     return [
-        Table(
+        Table.of(
             "Repeating the whole plan",
-            [
-                "effect",
-                "chi-square of the effect against no effect, now",
-                "the same, infinitely many repeats",
-                f"repeats of the plan until {RESOLVED:.0f}",
-            ],
-            rows,
+            of_plan.items(),
+            {
+                "effect": lambda item: item[0],
+                "chi-square of the effect against no effect, now": lambda item: number(
+                    item[1]["gain_now"], 3
+                ),
+                "the same, infinitely many repeats": lambda item: number(item[1]["gain_limit"], 3),
+                f"repeats of the plan until {RESOLVED:.0f}": lambda item: str(
+                    item[1]["times"] or "never"
+                ),
+            },
         )
     ]

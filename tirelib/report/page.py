@@ -1,10 +1,10 @@
 """Self-contained pages: tables, figures, and the templates that hold them."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
@@ -15,6 +15,7 @@ from tirelib.report.style import AXES_NAME, save
 
 DASH = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +28,28 @@ class Table:
     texts: int = 1
     note: str = ""
     folded: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        title: str,
+        items: Iterable[T],
+        columns: Mapping[str, Callable[[T], str]],
+        *,
+        texts: int = 1,
+        note: str = "",
+        folded: bool = False,
+    ) -> "Table":
+        """Return a table with a row for each item.
+
+        Parameters
+        ----------
+        items : iterable
+        columns : mapping
+            The heading of each column, and what its cell says of an item.
+        """
+        rows = [[cell(item) for cell in columns.values()] for item in items]
+        return cls(title, list(columns), rows, texts, note, folded)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +109,11 @@ def number(value: float | None, digits: int = 4) -> str:
     if "." in text:
         text = text.rstrip("0").rstrip(".")
     return text.replace("-", MINUS)
+
+
+def numbers(values: Iterable[float], digits: int = 3) -> str:
+    """Return numbers with this many significant digits, separated by commas."""
+    return ", ".join(number(float(value), digits) for value in values)
 
 
 def p_value(value: float) -> str:

@@ -122,47 +122,33 @@ _KEYS = ("ratio", "strength", "n", "found", "found_low", "found_high", "in_set",
 
 
 def _effects(document: Mapping[str, Any]) -> Table:
-    rows = []
-    for entry in document["effects"]:
-        twins = ", ".join(f"{t['effect']} {t['angle_deg']:.0f}\u00b0" for t in entry["twins"])
-        for result in entry["results"]:
-            some = result["n"] > 0
-            rows.append(
-                [
-                    entry["effect"],
-                    ", ".join(result["named"]),
-                    twins,
-                    number(result["ratio"]),
-                    number(result["strength"], 3),
-                    entry["unit"],
-                    _percent(result["found"]) if some else DASH,
-                    f"{_percent(result['found_low'])} to {_percent(result['found_high'])}"
-                    if some
-                    else DASH,
-                    _percent(result["in_set"]) if some else DASH,
-                    _percent(result["wrong"]) if some else DASH,
-                    _percent(result["seen"]) if some else DASH,
-                ]
-            )
-    return Table(
+    rows = [{**entry, **result} for entry in document["effects"] for result in entry["results"]]
+    return Table.of(
         "Effects",
-        [
-            "effect",
-            "in a set",
-            "twins (angle)",
-            "error ratio",
-            "strength",
-            "unit",
-            "found [%]",
-            "95 %",
-            "in the set [%]",
-            "only others [%]",
-            "something missing [%]",
-        ],
         rows,
+        {
+            "effect": lambda row: row["effect"],
+            "in a set": lambda row: ", ".join(row["named"]),
+            "twins (angle)": lambda row: ", ".join(
+                f"{twin['effect']} {twin['angle_deg']:.0f}\u00b0" for twin in row["twins"]
+            ),
+            "error ratio": lambda row: number(row["ratio"]),
+            "strength": lambda row: number(row["strength"], 3),
+            "unit": lambda row: row["unit"],
+            "found [%]": lambda row: _percent(row, "found"),
+            "95 %": lambda row: (
+                f"{_percent(row, 'found_low')} to {_percent(row, 'found_high')}"
+                if row["n"]
+                else DASH
+            ),
+            "in the set [%]": lambda row: _percent(row, "in_set"),
+            "only others [%]": lambda row: _percent(row, "wrong"),
+            "something missing [%]": lambda row: _percent(row, "seen"),
+        },
         texts=3,
     )
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.0f}"
+def _percent(row: Mapping[str, Any], key: str) -> str:
+    """Return a share of the tires in which the effect was planted; a dash where there are none."""
+    return f"{100.0 * row[key]:.0f}" if row["n"] else DASH

@@ -42,18 +42,15 @@ def _summary(regression: Regression) -> str:
 
 
 def _one_regression(regression: Regression) -> Table:
-    return Table(
-        title=f"{regression.name} ({regression.source})",
-        columns=("term", "coefficient", "std error", "p value"),
-        rows=[
-            (
-                term.name,
-                number(term.coefficient, 5),
-                number(term.std_error, 3),
-                p_value(term.p_value),
-            )
-            for term in regression.terms
-        ],
+    return Table.of(
+        f"{regression.name} ({regression.source})",
+        regression.terms,
+        {
+            "term": lambda term: term.name,
+            "coefficient": lambda term: number(term.coefficient, 5),
+            "std error": lambda term: number(term.std_error, 3),
+            "p value": lambda term: p_value(term.p_value),
+        },
         note=_summary(regression),
     )
 
@@ -223,35 +220,22 @@ def _candidates(trained: Trained, quantity: str, name: str, model: Polynomial) -
 
 def held_out_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """Return the cross-validation by level: each level of a condition left out of the fit."""
-    return Table(
+    where = {True: "between others", False: "beyond others", None: ""}
+    return Table.of(
         "Error at a held-out level",
-        (
-            "held out",
-            "level",
-            "quantity",
-            "unit",
-            "where",
-            "runs",
-            "dissertation",
-            "in use",
-            "in range",
-            "in use, in range",
-        ),
-        [
-            (
-                str(row["held_out"]).replace("_", " "),
-                str(row["level"]),
-                TITLE.get(str(row["quantity"]), str(row["quantity"])),
-                str(row["unit"]),
-                {True: "between others", False: "beyond others"}.get(row.get("inside"), ""),  # type: ignore[arg-type]
-                str(row.get("n", "")),
-                number(row["dissertation"]),
-                number(row["in_use"]),
-                f"{row['in_range']:.0%}" if "in_range" in row else DASH,
-                number(row.get("in_use_in_range")),
-            )
-            for row in rows
-        ],
+        rows,
+        {
+            "held out": lambda row: str(row["held_out"]).replace("_", " "),
+            "level": lambda row: str(row["level"]),
+            "quantity": lambda row: TITLE.get(str(row["quantity"]), str(row["quantity"])),
+            "unit": lambda row: str(row["unit"]),
+            "where": lambda row: where[row.get("inside")],
+            "runs": lambda row: str(row.get("n", "")),
+            "dissertation": lambda row: number(row["dissertation"]),
+            "in use": lambda row: number(row["in_use"]),
+            "in range": lambda row: f"{row['in_range']:.0%}" if "in_range" in row else DASH,
+            "in use, in range": lambda row: number(row.get("in_use_in_range")),
+        },
         texts=5,
         note="A level beyond the others is an extrapolation. Errors are root mean squares over "
         "run means. Turns outside the calibrated range are flagged; the last column holds the "
