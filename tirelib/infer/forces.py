@@ -211,18 +211,32 @@ class ForceProblem:
             groups[f"{name}, slip"] = shapes * factor
         return groups
 
-    def roughly(self, rows: FloatArray) -> FloatArray:
-        """Return how rows would look if their law were roughly right.
+    def roughly(
+        self, effects: Sequence[Effect], done: Sequence[FloatArray]
+    ) -> Sequence[FloatArray]:
+        """Return how the laws of effects may be off: smoothly over pairs of conditions.
 
-        Each goes otherwise with load, pressure, camber, temperature and order; and smooth shapes
-        over the slip, as large as the rows are there, are added.
+        What an effect of one condition does may go otherwise over the slip, on either side of it,
+        with its own condition and with every other one; each of these errors is as large as what
+        all of the effects do together, for an effect may be small because the base or another one
+        has done most of what its condition does.
         """
-        factors = list(self._factors().values())
-        square = np.sum(rows**2, axis=0)
-        share = self.size**2 / float(np.mean(self.size**2))
-        size = np.sqrt(0.5 * square + 0.5 * float(np.mean(square)) * share)
-        parts = [self._shapes() * size, *(rows * (f - float(np.mean(f))) for f in factors)]
-        return np.concatenate(parts)
+        factors = self._factors()
+        whole = float(np.sqrt(sum(np.mean(rows.sum(axis=0) ** 2) for rows in done)))
+        slips, out = self._shapes() * self.size, []
+        for effect, rows in zip(effects, done, strict=True):
+            one = np.ones_like(self.size)
+            own = [factors[name] for name in effect.varies_with if name in factors] or [one]
+            pairs = [f * g for f in own for g in (one, *factors.values())]
+            parts = [slips * pair for pair in pairs]
+            sizes = [np.sqrt(np.mean(np.sum(part**2, axis=0))) for part in parts]
+            otherwise = [rows * (f - float(np.mean(f))) for f in factors.values()]
+            out.append(
+                np.concatenate(
+                    [*(whole / s * p for p, s in zip(parts, sizes, strict=True)), *otherwise]
+                )
+            )
+        return out
 
     def _shapes(self) -> FloatArray:
         return np.asarray(bumps(np.clip(self.slip, -REACH, REACH)[None], KNOTS, REACH)[:, 0])
@@ -238,7 +252,8 @@ class ForceProblem:
             "temperature": (at.temperature - middle["temperature"]) / 20.0,
             "speed": np.log(np.abs(at.speed) / middle["speed"]) if middle["speed"] else at.speed,
         }
-        found = {name: factor for name, factor in every.items() if varies(at, name)}
+        # a tire that rolls both ways at one speed has a speed that varies, and nothing goes with it
+        found = {name: f for name, f in every.items() if varies(at, name) and np.ptp(f) > 0.0}
         return found | {"order": 2.0 * at.order - 1.0}
 
     def _slip(self, state: BrushState) -> FloatArray:

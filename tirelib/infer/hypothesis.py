@@ -227,11 +227,7 @@ def products(problem: Problem, views: Sequence[View], tires: FloatArray) -> Prod
 
 def law_errors(fit: Posterior, looser: float) -> dict[str, float | FloatArray]:
     """Return variances of the blocks of laws that are but roughly right."""
-    out: dict[str, float | FloatArray] = {}
-    for effect, strength in zip(fit.effects, fit.strengths, strict=True):
-        size = float(np.linalg.norm(strength)) / effect.scale
-        out[ROUGHLY + effect.name] = (looser * LAW * size) ** 2
-    return out
+    return {ROUGHLY + name: (looser * LAW) ** 2 for name in fit.names}
 
 
 def plausible(fit: Posterior, own_effects: int) -> bool:

@@ -68,7 +68,8 @@ class Posterior:
         slopes: all coefficients of the rows are counted from there.
     rows : mapping of name to shape (k, ...)
         "base" (strengths of the model's effects behind it), further effects by name, the groups of
-        the remainder, and "roughly NAME" for each effect of the model.
+        the remainder, and "roughly NAME" for each effect of the model: errors of its law as large
+        as what it does.
     widths : shape (n_coordinates,)
         Prior standard deviations of the block "base".
     covariance : shape (n_coordinates, n_coordinates)
@@ -286,10 +287,15 @@ def explaining(
         every[effect.name] = slopes[first : first + effect.components]
         first += effect.components
     every |= problem.remainder(point, solved)
-    first = len(point.base)
-    for effect in own:
-        every[ROUGHLY + effect.name] = problem.roughly(slopes[first : first + effect.components])
+    first, done = len(point.base), []
+    for effect, strength in zip(own, point.strengths, strict=False):
+        rows = slopes[first : first + effect.components]
+        done.append(
+            np.array([s * row for s, row in zip(strength / effect.scale, rows, strict=True)])
+        )
         first += effect.components
+    for effect, rows in zip(own, problem.roughly(own, done), strict=True):
+        every[ROUGHLY + effect.name] = rows
     return every, slopes
 
 

@@ -94,5 +94,10 @@ class Problem(Protocol):
     def remainder(self, point: Point, solved: Any) -> Mapping[str, FloatArray]:
         """Return groups of smooth shapes that no law describes, rows (k, ...) each."""
 
-    def roughly(self, rows: FloatArray) -> FloatArray:
-        """Return how rows (components, ...) would look if their law were roughly right."""
+    def roughly(
+        self, effects: Sequence[Effect], done: Sequence[FloatArray]
+    ) -> Sequence[FloatArray]:
+        """Return for each effect how its law may be off, rows (k, ...).
+
+        `done` is what each effect does, (components, ...). The rows are of errors as large as that.
+        """

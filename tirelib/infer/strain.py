@@ -424,7 +424,13 @@ class StrainProblem:
             groups[f"{name}, free belt"] = rows[np.abs(centre) >= INSIDE]
         return groups
 
-    def roughly(self, rows: FloatArray) -> FloatArray:
+    def roughly(
+        self, effects: Sequence[Effect], done: Sequence[FloatArray]
+    ) -> Sequence[FloatArray]:
+        """Return how what effects do would look if their laws were roughly right."""
+        return [self._roughly(rows) for rows in done]
+
+    def _roughly(self, rows: FloatArray) -> FloatArray:
         """Return how rows would look if their law were roughly right.
 
         Each goes otherwise with load, pressure, speed and time; and smooth shapes over the wheel

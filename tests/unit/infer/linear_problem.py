@@ -1,6 +1,6 @@
 """A linear problem without any tire: what a model leaves is known exactly."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,8 +88,8 @@ class Toy:
     def remainder(self, point: Point, solved: Any) -> dict[str, FloatArray]:
         return {"smooth, all": self.shapes, "smooth, there": self.there}
 
-    def roughly(self, rows: FloatArray) -> FloatArray:
-        return rows * np.sin(np.arange(N) / 10.0)
+    def roughly(self, effects: Any, done: Sequence[FloatArray]) -> list[FloatArray]:
+        return [rows * np.sin(np.arange(N) / 10.0) for rows in done]
 
 
 def drawn(random: np.random.Generator, *, size: float = 1.0, **planted: float) -> FloatArray:

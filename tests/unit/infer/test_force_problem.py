@@ -118,3 +118,25 @@ def test_a_law_of_the_users_own_is_a_candidate() -> None:
     ours, users = made.slopes(point, solved)[-2:]
     scale = -2.0 * grip.scale / CATALOGUE["friction_load"].scale
     np.testing.assert_allclose(users, scale * ours, rtol=1e-4, atol=1e-6)
+
+
+def test_a_laws_error_is_as_large_as_what_all_effects_do_and_goes_with_pairs_of_conditions() -> (
+    None
+):
+    made = force_problem()
+    at, size = made.bench.conditions, made.size
+    effects = [CATALOGUE["friction_load"], CATALOGUE["friction_pressure"]]
+    large, small = (0.1 * size * np.sign(made.slip))[None], (1e-6 * size)[None]
+    alone, both = made.roughly(effects[:1], [large]), made.roughly(effects, [large, small])
+    np.testing.assert_allclose(both[0], alone[0], rtol=1e-6)
+    count = len(both[1])
+    # the small one's law is off by as much as the large one's
+    strength = [np.sqrt(np.mean(np.sum(rows**2, axis=0))) for rows in both]
+    assert strength[1] == pytest.approx(strength[0], rel=0.5)
+    assert len(made.roughly(effects, [0.0 * large, 0.0 * small])[1]) == count
+    # friction over pressure that goes with the load, on one side of the slip
+    pair = size * (at.pressure / np.median(at.pressure) - 1.0) * np.log(at.load / 4e3)
+    pair = pair * (made.slip > 0.5)
+    for rows, least, most in ((both[1], 0.0, 0.2), (alone[0][: 7 * 2], 0.8, 1.0)):
+        left = pair - np.linalg.lstsq(rows.T, pair, rcond=None)[0] @ rows
+        assert least <= np.linalg.norm(left) / np.linalg.norm(pair) <= most

@@ -1,5 +1,6 @@
 """A further run in a linear problem: what it must show to put a wrong hypothesis out of the set."""
 
+from collections.abc import Sequence
 from copy import copy
 from typing import Any
 
@@ -59,8 +60,8 @@ class Ahead(Toy):
     def solve(self, point: Any, near: Any = None) -> Solved:
         return super().solve(point, near)
 
-    def roughly(self, rows: FloatArray) -> FloatArray:
-        return rows * np.sin(np.arange(rows.shape[1]) / 10.0)
+    def roughly(self, effects: Any, done: Sequence[FloatArray]) -> list[FloatArray]:
+        return [rows * np.sin(np.arange(rows.shape[1]) / 10.0) for rows in done]
 
 
 @pytest.fixture(scope="module")
