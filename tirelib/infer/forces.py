@@ -222,7 +222,7 @@ class ForceProblem:
         has done most of what its condition does.
         """
         factors = self._factors()
-        whole = float(np.sqrt(sum(np.mean(rows.sum(axis=0) ** 2) for rows in done)))
+        whole = float(np.sqrt(sum(np.mean(rows**2) for rows in done)))
         slips, out = self._shapes() * self.size, []
         for effect, rows in zip(effects, done, strict=True):
             one = np.ones_like(self.size)

@@ -289,10 +289,8 @@ def explaining(
     every |= problem.remainder(point, solved)
     first, done = len(point.base), []
     for effect, strength in zip(own, point.strengths, strict=False):
-        rows = slopes[first : first + effect.components]
-        done.append(
-            np.array([s * row for s, row in zip(strength / effect.scale, rows, strict=True)])
-        )
+        size = float(np.linalg.norm(strength)) / effect.scale
+        done.append(size * slopes[first : first + effect.components])
         first += effect.components
     for effect, rows in zip(own, problem.roughly(own, done), strict=True):
         every[ROUGHLY + effect.name] = rows

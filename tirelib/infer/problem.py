@@ -99,5 +99,5 @@ class Problem(Protocol):
     ) -> Sequence[FloatArray]:
         """Return for each effect how its law may be off, rows (k, ...).
 
-        `done` is what each effect does, (components, ...). The rows are of errors as large as that.
+        `done` are each effect's rows at the size of its strength, (components, ...). The rows are of errors as large as that.
         """
