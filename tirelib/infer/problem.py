@@ -99,5 +99,6 @@ class Problem(Protocol):
     ) -> Sequence[FloatArray]:
         """Return for each effect how its law may be off, rows (k, ...).
 
-        `done` are each effect's rows at the size of its strength, (components, ...). The rows are of errors as large as that.
+        `done` are each effect's rows at the size of its strength, (components, ...). The
+        rows are of errors as large as that.
         """
