@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from tirelib.diagnose.document import Assessment, exceeds, next_test
 from tirelib.diagnose.held_out import pooled
@@ -13,8 +12,8 @@ from tirelib.diagnose.left import Left, left_of
 from tirelib.report.comparison import METHOD, RING
 from tirelib.report.figures.compare_plot import (
     ANGLE_TITLE,
-    DIVERGING,
     Plot,
+    heat,
     limit_of,
     styled_figure,
 )
@@ -227,17 +226,12 @@ def _map(told: Assessment, left: Left, name: str, title: str) -> Plot:
     unit = _unit(told)
     limit = limit_of(told.refitted.white_of(told.refitted.rest))
     degrees = np.rad2deg(GRID)
-    figure = go.Figure(
-        go.Heatmap(
-            z=np.round(data, 2),
-            x=np.round(degrees, 2),
-            y=list(range(len(order))),
-            zmin=-limit,
-            zmax=limit,
-            colorscale=DIVERGING,
-            hovertemplate="%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>",
-            colorbar={"title": {"text": f"model less<br>measured<br>[{unit}]"}},
-        )
+    figure = heat(
+        np.round(data, 2),
+        np.round(degrees, 2),
+        limit,
+        unit,
+        hovertemplate="%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>",
     )
     figure.update_xaxes(title=ANGLE_TITLE, range=[-180, 180], dtick=30)
     marks = list(range(0, len(order), max(1, len(order) // 10)))

@@ -11,7 +11,7 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from tirelib.report.page import number
+from tirelib.report.page import number, unit_name
 
 TITLES = {
     "missing": "What is missing",
@@ -200,11 +200,9 @@ def error_line(told: Mapping[str, Any]) -> str:
     told : mapping
         ``tirelib-diagnosis/1`` or ``tirelib-extension/1``.
     """
-    unit = {"noise": "times the noise", "ustrain": "microstrain"}.get(
-        told["error_unit"], told["error_unit"]
-    )
+    unit = "times the noise" if told["error_unit"] == "noise" else unit_name(told["error_unit"])
     before, after = told["error_before"], told["error_after"]
-    raw = {"ustrain": "microstrain"}.get(told["residual_rms_unit"], told["residual_rms_unit"])
+    raw = unit_name(told["residual_rms_unit"])
     rms = [
         f"{number(told[f'residual_rms_{when}'], SENSE)} {raw} rms" for when in ("before", "after")
     ]

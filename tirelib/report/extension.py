@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from tirelib.report.explanation import error_line, fold_name, said_strength
+from tirelib.report.figures.before_after import part_errors, run_errors
 from tirelib.report.figures.waterfall import waterfall_of
-from tirelib.report.journey import WORDS, part_errors, run_errors
-from tirelib.report.page import Table, number
+from tirelib.report.page import Table, number, unit_name
 from tirelib.report.parts_page import Part, write_parts_page
 
 
@@ -59,7 +59,7 @@ def write_extension(told: Mapping[str, Any], folder: Path) -> tuple[Path, Path]:
 
 
 def _errors(told: Mapping[str, Any]) -> Table:
-    unit = WORDS.get(told["error_unit"], told["error_unit"])
+    unit = unit_name(told["error_unit"])
     rows = [
         ["given model, fitted runs", number(told["error_before"], 3), ""],
         [

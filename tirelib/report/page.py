@@ -116,6 +116,11 @@ def numbers(values: Iterable[float], digits: int = 3) -> str:
     return ", ".join(number(float(value), digits) for value in values)
 
 
+def unit_name(unit: str) -> str:
+    """Return the unit of a document as sentences and titles say it."""
+    return {"ustrain": "microstrain"}.get(unit, unit)
+
+
 def p_value(value: float) -> str:
     """Return a p-value in the form of statistics tables.
 

@@ -11,9 +11,18 @@ from tirelib.compare.forces import UNITS, ForceComparison
 from tirelib.compare.sentences import told
 from tirelib.identify.error_bands import levels
 from tirelib.identify.force_points import CELL_ANGLE
-from tirelib.report.figures.compare_plot import DIVERGING, Plot, limit_of, styled_figure
+from tirelib.report.figures.compare_plot import (
+    Plot,
+    confidence,
+    heat,
+    limit_of,
+    noise_band,
+    stack_titles,
+    stacked,
+    styled_figure,
+)
 from tirelib.report.figures.compare_trends import SYMBOLS
-from tirelib.report.style import BLUE, CATEGORIES, FAINT, RED
+from tirelib.report.style import BLUE, CATEGORIES, FAINT, INK, RED
 
 _OVER = (
     ("slip_angle", "slip angle [deg] (ISO 8855)", np.rad2deg(1.0)),
@@ -69,18 +78,13 @@ def _map(found: ForceComparison) -> Plot:
                 z[i, j] = factor * float(found.difference[inside].mean())
     limit = limit_of(z)
     labels = [told("load", 50.0 * round(float(v) / 50.0)) for v in y]
-    figure = go.Figure(
-        go.Heatmap(
-            z=np.round(z, 3),
-            x=np.round(scale * x, 4),
-            y=list(range(y.size)),
-            zmin=-limit,
-            zmax=limit,
-            colorscale=DIVERGING,
-            hoverongaps=False,
-            hovertemplate="%{x:.3g}: %{z:.3g} " + unit + "<extra></extra>",
-            colorbar={"title": {"text": f"model less<br>measured<br>[{unit}]"}},
-        )
+    figure = heat(
+        np.round(z, 3),
+        np.round(scale * x, 4),
+        limit,
+        unit,
+        hoverongaps=False,
+        hovertemplate="%{x:.3g}: %{z:.3g} " + unit + "<extra></extra>",
     )
     figure.update_xaxes(title=label)
     figure.update_yaxes(
@@ -113,51 +117,17 @@ def _curve(found: ForceComparison, curve: Curve, place: str) -> Plot:
     k = curve.member
     x = scale * getattr(found.data, name)[k]
     measured, model, rest = found.measured[k], found.predicted[k], found.difference[k]
-    figure = make_subplots(
-        rows=2, cols=1, shared_xaxes=True, row_heights=[0.66, 0.34], vertical_spacing=0.07
-    )
-    figure.add_scatter(
-        x=x,
-        y=measured,
+    figure = stacked(
+        x,
+        [
+            {"y": measured, "name": "measured", "marker": {"color": BLUE, "size": 6}},
+            {"y": model, "name": "model", "marker": {"color": RED, "size": 6, "symbol": "x"}},
+        ],
+        [{"y": rest, "name": "model less measured", "marker": {"color": INK, "size": 5}}],
         mode="markers",
-        name="measured",
-        marker={"color": BLUE, "size": 6},
-        row=1,
-        col=1,
     )
-    figure.add_scatter(
-        x=x,
-        y=model,
-        mode="markers",
-        name="model",
-        marker={"color": RED, "size": 6, "symbol": "x"},
-        row=1,
-        col=1,
-    )
-    figure.add_scatter(
-        x=x,
-        y=rest,
-        mode="markers",
-        name="model less measured",
-        marker={"color": "#1c2530", "size": 5},
-        row=2,
-        col=1,
-    )
-    figure.add_hline(y=0.0, line={"color": FAINT, "width": 1}, row=2, col=1)
-    if np.isfinite(found.noise):
-        figure.add_hrect(
-            y0=-1.96 * found.noise,
-            y1=1.96 * found.noise,
-            line_width=0,
-            fillcolor=FAINT,
-            opacity=0.3,
-            row=2,
-            col=1,
-        )
-    figure.update_xaxes(title=label, row=2, col=1)
-    figure.update_yaxes(title=_label(found), row=1, col=1)
-    figure.update_yaxes(title=f"difference<br>[{unit}]", row=2, col=1)
-    styled_figure(figure, 500, legend={"orientation": "h", "y": 1.1, "x": 0.0})
+    noise_band(figure, found.noise, row=2, col=1)
+    stack_titles(figure, label, _label(found), unit)
     noise = f", {curve.rms / found.noise:.1f} noise" if np.isfinite(found.noise) else ""
     rows = np.round(np.stack([x, measured, model, rest], axis=1), 5).tolist()
     return Plot(
@@ -192,21 +162,8 @@ def _trend(found: ForceComparison, name: str, label: str, scale: float) -> Plot:
             error = part.std(ddof=1) / np.sqrt(part.size)
             half[k] = error * special.stdtrit(part.size - 1, 0.975)
     x = scale * x
-    known = np.isfinite(half)
     figure = go.Figure()
-    figure.add_scatter(
-        x=np.concatenate([x[known], x[known][::-1]]),
-        y=np.concatenate([(centre + half)[known], (centre - half)[known][::-1]]),
-        fill="toself",
-        mode="lines",
-        fillcolor="rgba(0,114,178,0.22)",
-        line={"width": 0},
-        hoverinfo="skip",
-        name="95 % confidence",
-    )
-    figure.add_scatter(
-        x=x, y=centre, mode="lines+markers", line={"color": BLUE}, name="mean over the points"
-    )
+    confidence(figure, x, centre, half, "points")
     figure.add_hline(y=0.0, line={"color": FAINT, "width": 1})
     figure.update_xaxes(title=label)
     figure.update_yaxes(title=f"{what} [{unit}]")
@@ -330,17 +287,7 @@ def _differences(found: ForceComparison) -> Plot:
             col=k,
         )
         figure.update_xaxes(title=label, row=1, col=k)
-        figure.add_hline(y=0.0, line={"color": FAINT, "width": 1}, row=1, col=k)
-        if np.isfinite(found.noise):
-            figure.add_hrect(
-                y0=-1.96 * found.noise,
-                y1=1.96 * found.noise,
-                line_width=0,
-                fillcolor=FAINT,
-                opacity=0.3,
-                row=1,
-                col=k,
-            )
+        noise_band(figure, found.noise, row=1, col=k)
     figure.update_yaxes(
         title=f"model less measured {found.quantity} [{UNITS[found.quantity]}]", row=1, col=1
     )

@@ -12,8 +12,8 @@ from tirelib.compare.strain import Comparison
 from tirelib.identify.error_bands import levels
 from tirelib.report.figures.compare_plot import (
     ANGLE_TITLE,
-    DIVERGING,
     Plot,
+    heat,
     limit_of,
     styled_figure,
 )
@@ -42,7 +42,7 @@ def heat_maps(found: Comparison) -> list[Plot]:
         data = np.stack([found.difference[m].mean(axis=0) for m in members])
         count = [int(m.sum()) for m in members]
         unit = UNITS[factor.name][0]
-        plots.append(_map(found, data, rows, count, factor.name, unit, signed=len(count)))
+        plots.append(_map(found, data, rows, count, factor.name, unit))
     return plots
 
 
@@ -56,7 +56,7 @@ def gage_plots(found: Comparison) -> list[Plot]:
         data = found.by_gage[straight].mean(axis=0)[order]
         rows = [(f"y = {millimetres(1e-3 * lateral[k])}", lateral[k]) for k in order]
         count = [int(straight.sum())] * len(rows)
-        plots.append(_map(found, data, rows, count, "gage", "mm", signed=len(rows)))
+        plots.append(_map(found, data, rows, count, "gage", "mm"))
     return plots
 
 
@@ -81,7 +81,7 @@ def _runs(found: Comparison) -> Plot:
         f"{c['speed'][i] * 3.6:.0f} km/h" + _slip(c, i)
         for i in order
     ]
-    figure = _heat(data, labels, unit, list(range(len(order))))
+    figure = _heat(data, labels, unit)
     ticks, texts = _load_ticks(found, order)
     figure.update_yaxes(
         title={"text": "runs by load, pressure and speed", "standoff": 12},
@@ -144,8 +144,6 @@ def _map(
     count: list[int],
     name: str,
     unit: str,
-    *,
-    signed: int,
 ) -> Plot:
     factor, noise = unit_of(found)
     values = factor * data
@@ -154,15 +152,14 @@ def _map(
         values,
         [f"{t} ({n} runs)" for t, n in zip(labels, count, strict=True)],
         noise,
-        list(range(signed)),
     )
     figure.update_yaxes(
         title={"text": NAMES[name], "standoff": 12},
-        tickvals=list(range(signed)),
+        tickvals=list(range(len(labels))),
         ticktext=labels,
         showgrid=False,
     )
-    styled_figure(figure, 200 + 34 * signed)
+    styled_figure(figure, 200 + 34 * len(labels))
     axes = " (ISO 8855)" if name in ("slip_angle", "camber", "slip_ratio", "gage") else ""
     return Plot(
         f"heat-{name.replace('_', '-')}",
@@ -176,24 +173,19 @@ def _map(
 _LEGEND = {"orientation": "h", "y": 1.08, "x": 0.0}
 
 
-def _heat(data: FloatArray, labels: list[str], unit: str, y: list[int]) -> go.Figure:
+def _heat(data: FloatArray, labels: list[str], unit: str) -> go.Figure:
     limit = limit_of(data)
-    text = np.broadcast_to(np.array(labels, dtype=object)[:, None], data.shape)
-    figure = go.Figure(
-        go.Heatmap(
-            z=np.round(data, 2),
-            x=np.round(DEGREES, 3),
-            y=y,
-            zmin=-limit,
-            zmax=limit,
-            colorscale=DIVERGING,
-            customdata=None,
-            text=None if len(y) > 12 else text,
-            hovertemplate="%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>"
-            if len(y) > 12
-            else "%{text}<br>%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>",
-            colorbar={"title": {"text": f"model less<br>measured<br>[{unit}]"}, "len": 1.0},
-        )
+    few = len(labels) <= 12
+    figure = heat(
+        np.round(data, 2),
+        np.round(DEGREES, 3),
+        limit,
+        unit,
+        text=np.broadcast_to(np.array(labels, dtype=object)[:, None], data.shape) if few else None,
+        hovertemplate=("%{text}<br>" if few else "")
+        + "%{x:.0f} deg: %{z:.3g} "
+        + unit
+        + "<extra></extra>",
     )
     figure.update_xaxes(title=ANGLE_TITLE, range=[-180, 180], dtick=30)
     return figure

@@ -14,7 +14,7 @@ from tirelib.compare.set_points import NAMES
 from tirelib.compare.strain import Comparison
 from tirelib.compare.tracks import Track
 from tirelib.report.figures.compare_heat import NAMES as CONDITIONS
-from tirelib.report.figures.compare_plot import Plot, styled_figure
+from tirelib.report.figures.compare_plot import Plot, confidence, styled_figure
 from tirelib.report.style import BLACK, BLUE, CATEGORIES, FAINT, RED
 
 _HOW = {
@@ -65,7 +65,7 @@ def _trend(found: Comparison, factor: Factor) -> Plot:
     for number, name in enumerate(SECTORS):
         centre, half = _bands(means[:, number], factor)
         where = {"row": number // 3 + 1, "col": number % 3 + 1}
-        _band(figure, x, centre, half, number == 0, where)
+        confidence(figure, x, centre, half, "runs", showlegend=number == 0, **where)
         rows += [
             [name, float(x[k]), round(float(centre[k]), 3), round(float(half[k]), 3)]
             for k in range(x.size)
@@ -102,47 +102,6 @@ def _bands(values: FloatArray, factor: Factor) -> tuple[FloatArray, FloatArray]:
             wide = float(error * special.stdtrit(part.size - 1, 0.975))
         half.append(wide)
     return np.array(centre), np.array(half)
-
-
-def _band(
-    figure: go.Figure,
-    x: FloatArray,
-    centre: FloatArray,
-    half: FloatArray,
-    first: bool,
-    where: dict[str, int],
-) -> None:
-    known = np.isfinite(half)
-    if known.any():
-        ends = np.concatenate([x[known], x[known][::-1]])
-        band = np.concatenate([(centre + half)[known], (centre - half)[known][::-1]])
-        figure.add_trace(
-            go.Scatter(
-                x=ends,
-                y=band,
-                fill="toself",
-                mode="lines",
-                fillcolor="rgba(0,114,178,0.22)",
-                line={"width": 0},
-                hoverinfo="skip",
-                showlegend=first,
-                name="95 % confidence",
-                legendgroup="band",
-            ),
-            **where,
-        )
-    figure.add_trace(
-        go.Scatter(
-            x=x,
-            y=np.round(centre, 2),
-            mode="lines+markers",
-            showlegend=first,
-            line={"color": BLUE},
-            name="mean over the runs",
-            legendgroup="mean",
-        ),
-        **where,
-    )
 
 
 def track_plots(found: Comparison) -> list[Plot]:

@@ -2,12 +2,18 @@
 
 import numpy as np
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
+from tirelib.arrays import FloatArray
 from tirelib.compare.strain import Comparison
 from tirelib.report.figures.compare_heat import DEGREES
-from tirelib.report.figures.compare_plot import ANGLE_TITLE, Plot, styled_figure
-from tirelib.report.style import BLUE, FAINT, RED
+from tirelib.report.figures.compare_plot import (
+    ANGLE_TITLE,
+    Plot,
+    noise_band,
+    stack_titles,
+    stacked,
+)
+from tirelib.report.style import BLUE, FAINT, INK, RED
 
 HALF = 100.0
 """Angles shown at first, [deg]; the rest by zooming out."""
@@ -24,61 +30,34 @@ def waveform_plots(found: Comparison) -> list[Plot]:
     return plots
 
 
+def waveform_axes(figure: go.Figure, edges: FloatArray) -> go.Figure:
+    """Return stacked waveforms with their axes, and with the contact's edges [rad] dotted."""
+    for edge in np.rad2deg(edges):
+        figure.add_vline(x=float(edge), line={"color": FAINT, "width": 1, "dash": "dot"})
+    figure.update_xaxes(range=[-HALF, HALF], dtick=20)
+    figure.update_yaxes(tickformat=",", row=1, col=1)
+    return stack_titles(figure, ANGLE_TITLE, "strain [microstrain]", "microstrain")
+
+
 def _one(found: Comparison, i: int, name: str) -> Plot:
     c = found.chosen.waves.conditions
     measured = 1e6 * (found.chosen.strain[i] - found.points.shift[i])
     model = 1e6 * found.prediction.strain[i]
     difference = 1e6 * found.difference[i]
-    figure = make_subplots(
-        rows=2, cols=1, shared_xaxes=True, row_heights=[0.68, 0.32], vertical_spacing=0.06
+    figure = stacked(
+        DEGREES,
+        [
+            {
+                "y": measured,
+                "name": "measured, set points taken out",
+                "line": {"color": BLUE, "width": 2},
+            },
+            {"y": model, "name": "model", "line": {"color": RED, "width": 2, "dash": "dash"}},
+        ],
+        [{"y": difference, "name": "model less measured", "line": {"color": INK, "width": 1.5}}],
     )
-    figure.add_scatter(
-        x=DEGREES,
-        y=measured,
-        name="measured, set points taken out",
-        line={"color": BLUE, "width": 2},
-        row=1,
-        col=1,
-    )
-    figure.add_scatter(
-        x=DEGREES,
-        y=model,
-        name="model",
-        line={"color": RED, "width": 2, "dash": "dash"},
-        row=1,
-        col=1,
-    )
-    if found.noise.known:
-        band = 1.96e6 * found.noise.std
-        figure.add_trace(
-            go.Scatter(
-                x=[DEGREES[0], DEGREES[-1], DEGREES[-1], DEGREES[0]],
-                y=[band, band, -band, -band],
-                fill="toself",
-                mode="lines",
-                fillcolor="rgba(93,107,122,0.35)",
-                line={"width": 0},
-                name="95 % of the noise",
-                hoverinfo="skip",
-            ),
-            row=2,
-            col=1,
-        )
-    figure.add_scatter(
-        x=DEGREES,
-        y=difference,
-        name="model less measured",
-        line={"color": "#1c2530", "width": 1.5},
-        row=2,
-        col=1,
-    )
-    for edge in np.rad2deg(found.prediction.edges[i]):
-        figure.add_vline(x=float(edge), line={"color": FAINT, "width": 1, "dash": "dot"})
-    figure.update_xaxes(range=[-HALF, HALF], dtick=20)
-    figure.update_xaxes(title=ANGLE_TITLE, row=2, col=1)
-    figure.update_yaxes(title="strain [microstrain]", tickformat=",", row=1, col=1)
-    figure.update_yaxes(title="difference<br>[microstrain]", row=2, col=1)
-    styled_figure(figure, 520, legend={"orientation": "h", "y": 1.1, "x": 0.0})
+    noise_band(figure, 1e6 * found.noise.std, row=2, col=1)
+    waveform_axes(figure, found.prediction.edges[i])
     rms = 1e6 * found.run_rms[i]
     noise = f", {found.run_rms[i] / found.noise.std:.1f} noise" if found.noise.known else ""
     rows = np.round(np.stack([DEGREES, measured, model, difference], axis=1), 3).tolist()
@@ -87,7 +66,8 @@ def _one(found: Comparison, i: int, name: str) -> Plot:
         f"{name.capitalize()} run: {found.run[i]} ({c['Fz'][i]:,.0f} N, "
         f"{c['pressure'][i] / 1e5:.2f} bar, {c['speed'][i] * 3.6:.0f} km/h)",
         f"Difference {rms:.0f} microstrain rms{noise}; strain without its mean over the turn, mean "
-        "over the gages, tension positive. Dotted: edges of the model's contact.",
+        "over the gages, tension positive. Dotted: edges of the model's contact. Grey: 95 % of the "
+        "noise.",
         figure,
         [
             "wheel angle [deg]",

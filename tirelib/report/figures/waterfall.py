@@ -7,6 +7,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from tirelib.report.figures.compare_plot import Plot, styled_figure
+from tirelib.report.page import unit_name
 from tirelib.report.style import BLUE, FAINT, RED
 
 
@@ -102,10 +103,9 @@ def waterfall_of(history: Sequence[Mapping[str, Any]], quantity: str) -> Plot | 
         )
         for e in entries
     ]
-    unit_name = {"ustrain": "microstrain"}.get(unit, unit)
     return waterfall(
         [first, *steps],
-        unit_name,
+        unit_name(unit),
         value(entries[-1], "floor"),
         f"history-{quantity}",
         f"The model's history, {quantity}",
