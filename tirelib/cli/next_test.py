@@ -292,12 +292,11 @@ def _give(
 
 
 def _si(name: str, given: tuple[float, float] | None) -> "Range | None":
-    from tirelib.planning.envelope import AXES
-    from tirelib.units import to_si
+    from tirelib.quantities import QUANTITIES
 
     if given is None:
         return None
-    low, high = (float(to_si(x, AXES[name].unit, AXES[name].dimension)) for x in given)
+    low, high = (float(QUANTITIES[name].measured(x)) for x in given)
     return low, high
 
 
@@ -369,7 +368,7 @@ def _say(document: dict[str, Any]) -> None:
         return
     table = Table(box=SIMPLE_HEAD)
     axes = [axis for axis in AXES.values() if axis.key in document["candidates"][0]]
-    columns = [axis.title if axis.unit == "1" else f"{axis.title} [{axis.unit}]" for axis in axes]
+    columns = [axis.quantity.heading for axis in axes]
     for column in (*columns, "separation", "chance to resolve"):
         table.add_column(column, justify="right")
     table.add_column("hardest pair")

@@ -9,13 +9,12 @@ from tirelib.compare.forces import UNITS, ForceCell, ForceComparison
 from tirelib.compare.gages import Gage
 from tirelib.compare.regions import Region
 from tirelib.compare.sectors import Cell
-from tirelib.compare.sentences import UNITS as CONDITION_UNITS
 from tirelib.compare.sentences import place
 from tirelib.compare.set_points import NAMES
 from tirelib.compare.strain import Comparison
 from tirelib.compare.track_words import track_fit
 from tirelib.compare.tracks import Track
-from tirelib.units import from_si
+from tirelib.quantities import QUANTITIES
 
 FORMAT = "tirelib-comparison/1"
 
@@ -80,15 +79,18 @@ def _strain(found: Comparison) -> dict[str, Any]:
 
 def edge_value(by: str, value: float) -> float:
     """Return a condition in the unit that it is told in."""
-    unit, dimension = CONDITION_UNITS.get(by, ("", ""))
-    return float(from_si(value, unit, dimension)) if unit and np.isfinite(value) else value
+    return float(QUANTITIES[by].told(value)) if by in QUANTITIES and np.isfinite(value) else value
+
+
+def _unit(by: str) -> str:
+    return QUANTITIES[by].words if by in QUANTITIES else ""
 
 
 def _cell(cell: Cell, noise: float) -> dict[str, Any]:
     return {
         "by": cell.by,
         "value": edge_value(cell.by, cell.value),
-        "unit": CONDITION_UNITS.get(cell.by, ("", ""))[0],
+        "unit": _unit(cell.by),
         "sector": cell.sector,
         "runs": cell.runs,
         "rms": 1e6 * cell.rms,
@@ -106,7 +108,7 @@ def _region(region: Region, found: Comparison) -> dict[str, Any]:
         "by": region.by,
         "side": region.side or None,
         "value": edge_value(region.by, region.value),
-        "unit": CONDITION_UNITS.get(region.by, ("", ""))[0],
+        "unit": _unit(region.by),
         "runs": region.runs,
         "mean": 1e6 * region.mean,
         "mean_std": 1e6 * region.std,
@@ -224,7 +226,7 @@ def _force_cell(cell: ForceCell, noise: float) -> dict[str, Any]:
         "by": cell.by,
         "low": edge_value(cell.by, cell.low),
         "high": edge_value(cell.by, cell.high),
-        "unit": CONDITION_UNITS.get(cell.by, ("", ""))[0],
+        "unit": _unit(cell.by),
         "points": cell.points,
         "rms": cell.rms,
         "rms_noise": cell.rms / noise,

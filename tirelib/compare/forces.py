@@ -30,6 +30,7 @@ from tirelib.identify.force_data import FORCES, ForceData, force_data
 from tirelib.identify.force_noise import force_noise
 from tirelib.identify.force_points import CELL_ANGLE, ForcePoints, force_points
 from tirelib.parameters import TireFile
+from tirelib.quantities import QUANTITIES
 
 SLIP_LIMITS = {
     "slip_angle": np.deg2rad([1.0, 2.0, 4.0, 6.0, 9.0]),
@@ -40,7 +41,7 @@ CELLS = (
     "cells of 0.5 deg in slip angle and camber, 0.01 in slip ratio, a tenth in load, pressure and "
     "speed, 5 K in tread temperature"
 )
-UNITS = {"Fy": "N", "Fx": "N", "Mz": "Nm"}
+UNITS = {name: QUANTITIES[name].unit for name in ("Fy", "Fx", "Mz")}
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,17 +7,8 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.compare.regions import Region
 from tirelib.compare.sectors import SECTORS, sector_at
-from tirelib.units import from_si
+from tirelib.quantities import QUANTITIES
 
-UNITS = {
-    "load": ("N", "force"),
-    "pressure": ("bar", "pressure"),
-    "speed": ("km/h", "speed"),
-    "slip_angle": ("deg", "angle"),
-    "camber": ("deg", "angle"),
-    "slip_ratio": ("", "ratio"),
-}
-"""Unit that each condition is told in, and its dimension."""
 PLACES = {
     "contact": "in the contact",
     "entry edge": "at the entry of the contact",
@@ -36,10 +27,10 @@ def told(by: str, value: float) -> str:
     >>> told("load", 4500.0), told("pressure", 1.7e5), told("slip_ratio", -0.04)
     ('4,500 N', '1.7 bar', '-0.04')
     """
-    unit, dimension = UNITS[by]
-    number = from_si(value, unit, dimension) if unit else value
+    quantity = QUANTITIES[by]
+    number = quantity.told(value)
     text = f"{number:,.0f}" if by in ("load", "speed") else f"{round(float(number), 3):g}"
-    return f"{text} {unit}".strip()
+    return f"{text} {quantity.words}".strip()
 
 
 def place(region: Region, edges: FloatArray) -> str:

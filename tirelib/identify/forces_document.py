@@ -13,11 +13,10 @@ from tirelib.identify.forces import ForceIdentification
 from tirelib.identify.lateral_force import PressureComparison
 from tirelib.identify.whole import Whole
 from tirelib.parameters import NUMBERS
+from tirelib.quantities import QUANTITIES
 from tirelib.units import from_si
 
-UNITS = {"Fx": "N", "Fy": "N", "Mz": "Nm"}
 _DEG = float(np.pi / 180.0)
-_BY = {"load": ("N", 1.0), "pressure": ("bar", 1e-5), "slip_angle": ("deg", 1.0 / _DEG)}
 
 
 def whole_document(campaign: Campaign, whole: Whole) -> dict[str, Any]:
@@ -97,7 +96,7 @@ def forces_document(found: ForceIdentification) -> dict[str, Any]:
         "points": fit.points,
         **{
             name: {
-                "unit": UNITS[name],
+                "unit": QUANTITIES[name].unit,
                 "rmse": rmse,
                 "rmse_percent_of_peak": 100.0 * rmse / fit.peak[name],
                 "r2": fit.r2[name],
@@ -186,5 +185,8 @@ def _band(row: BandError) -> dict[str, Any]:
 
 
 def _range(by: str, low: float, high: float) -> dict[str, Any]:
-    unit, factor = _BY.get(by, ("", 1.0))
-    return {"low": factor * low, "high": factor * high, "range_unit": unit}
+    if by not in QUANTITIES:
+        return {"low": low, "high": high, "range_unit": ""}
+    quantity = QUANTITIES[by]
+    ends = {"low": quantity.told(low), "high": quantity.told(high)}
+    return {**ends, "range_unit": quantity.words}

@@ -17,6 +17,7 @@ from tirelib.planning.envelope import AXES, Envelope
 from tirelib.planning.next_test import force_next_test, gains, next_test
 from tirelib.planning.repeats import force_gains
 from tirelib.planning.suspects import Suspects, suspects_of
+from tirelib.quantities import QUANTITIES
 
 FORMAT = "tirelib-next-test/1"
 PROMISING = 0.5
@@ -235,7 +236,7 @@ def _noise(plan: Plan, test: NextTest) -> dict[str, Any]:
 def _candidate(test: NextTest, k: int) -> dict[str, Any]:
     conditions = zip(test.envelope.names, test.points[k], strict=True)
     return {
-        **{AXES[name].key: float(AXES[name].told(value)) for name, value in conditions},
+        **{AXES[name].key: float(QUANTITIES[name].told(value)) for name, value in conditions},
         **_slips(test.envelope),
         "separation": float(test.score[k]),
         "separation_std": float(test.std[k]),
@@ -249,7 +250,7 @@ def _slips(envelope: Envelope) -> dict[str, Any]:
     if envelope.sweep is None:
         return {}
     axis = AXES[envelope.sweep.name]
-    told = [float(axis.told(value)) for value in envelope.sweep.values]
+    told = [float(axis.quantity.told(value)) for value in envelope.sweep.values]
     return {axis.key: None, axis.series: told}
 
 
@@ -286,13 +287,13 @@ def _repeats(plan: Plan, test: NextTest) -> dict[str, Any]:
 
 def _envelope(envelope: Envelope) -> dict[str, Any]:
     told = {
-        AXES[name].key: [float(AXES[name].told(x)) for x in ends]
+        AXES[name].key: [float(QUANTITIES[name].told(x)) for x in ends]
         for name, ends in envelope.ranges.items()
     }
     free = [name for name in envelope.names if name not in envelope.declared]
     if envelope.sweep is not None:
         axis, values = AXES[envelope.sweep.name], envelope.sweep.values
-        told[axis.key] = [float(axis.told(x)) for x in (values.min(), values.max())]
+        told[axis.key] = [float(axis.quantity.told(x)) for x in (values.min(), values.max())]
     return {
         **told,
         "declared": list(envelope.declared),

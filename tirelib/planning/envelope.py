@@ -11,7 +11,7 @@ from tirelib.arrays import FloatArray
 from tirelib.errors import ParameterError
 from tirelib.model.state import Operating
 from tirelib.planning.sweep import Sweep
-from tirelib.units import from_si
+from tirelib.quantities import QUANTITIES, Quantity
 
 Range = tuple[float, float]
 
@@ -22,7 +22,7 @@ class Axis:
 
     Attributes
     ----------
-    title, unit, dimension : str
+    quantity : Quantity
         How it is told.
     key : str
         In JSON.
@@ -30,37 +30,31 @@ class Axis:
         Share by which the ends of a campaign are moved outward where nothing is declared.
     levels : int
         Of the grid; a range of one value has one.
-    positive : bool
-        Whether only positive values make sense.
     series : str
         Key in JSON of the values that a sweep passes through; empty where there is no sweep of it.
     """
 
-    title: str
-    unit: str
-    dimension: str
+    quantity: Quantity
     key: str
     wider: float
     levels: int
-    positive: bool = True
     series: str = ""
 
-    def told(self, value: Any) -> Any:
-        """Return SI values in the unit."""
-        return from_si(value, self.unit, self.dimension)
+    @property
+    def positive(self) -> bool:
+        """Whether only positive values make sense."""
+        return not self.quantity.signed
 
 
 AXES: Mapping[str, Axis] = MappingProxyType(
     {
-        "load": Axis("load", "N", "force", "load_N", 0.25, 5),
-        "pressure": Axis("pressure", "bar", "pressure", "pressure_bar", 0.15, 3),
-        "speed": Axis("speed", "km/h", "speed", "speed_kmh", 0.25, 5),
-        "slip_angle": Axis(
-            "slip angle", "deg", "angle", "slip_angle_deg", 0.0, 7, False, "slip_angles_deg"
-        ),
-        "slip_ratio": Axis("slip ratio", "1", "ratio", "slip_ratio", 0.0, 7, False, "slip_ratios"),
-        "camber": Axis("camber", "deg", "angle", "camber_deg", 0.0, 2, False),
-        "temperature": Axis("tread temperature", "degC", "temperature", "temperature_degC", 0.0, 2),
+        "load": Axis(QUANTITIES["load"], "load_N", 0.25, 5),
+        "pressure": Axis(QUANTITIES["pressure"], "pressure_bar", 0.15, 3),
+        "speed": Axis(QUANTITIES["speed"], "speed_kmh", 0.25, 5),
+        "slip_angle": Axis(QUANTITIES["slip_angle"], "slip_angle_deg", 0.0, 7, "slip_angles_deg"),
+        "slip_ratio": Axis(QUANTITIES["slip_ratio"], "slip_ratio", 0.0, 7, "slip_ratios"),
+        "camber": Axis(QUANTITIES["camber"], "camber_deg", 0.0, 2),
+        "temperature": Axis(QUANTITIES["temperature"], "temperature_degC", 0.0, 2),
     }
 )
 """Every condition that may be planned."""
@@ -91,8 +85,8 @@ class Envelope:
 
     def __post_init__(self) -> None:
         faults = [
-            f"{AXES[name].title} {AXES[name].told(low):.4g} to {AXES[name].told(high):.4g} "
-            f"{AXES[name].unit}"
+            f"{QUANTITIES[name].title} {QUANTITIES[name].told(low):.4g} to "
+            f"{QUANTITIES[name].told(high):.4g} {QUANTITIES[name].unit}"
             for name, (low, high) in self.ranges.items()
             if not (-np.inf < low <= high < np.inf) or (AXES[name].positive and low <= 0.0)
         ]
@@ -130,7 +124,8 @@ class Envelope:
             if name not in axes:
                 raise ParameterError(
                     f"envelope: a range of {name.replace('_', ' ')} is declared, which these runs "
-                    f"cannot have; allowed are {', '.join(AXES[n].title for n in axes)}; leave "
+                    f"cannot have; allowed are "
+                    f"{', '.join(QUANTITIES[n].title for n in axes)}; leave "
                     "it out"
                 )
         ranges = {name: given.get(name) or _campaigns(points, name) for name in axes}
@@ -173,11 +168,12 @@ class Envelope:
         """
         said = []
         for name, value in zip(self.names, point, strict=True):
-            axis = AXES[name]
-            label = f"{axis.title} " if axis.dimension in ("angle", "ratio", "temperature") else ""
-            said.append(f"{label}{_number(name, value)}{_unit(axis)}")
+            quantity = QUANTITIES[name]
+            titled = quantity.dimension in ("angle", "ratio", "temperature")
+            label = f"{quantity.title} " if titled else ""
+            said.append(f"{label}{_number(name, value)}{_unit(name)}")
         if self.sweep is not None:
-            title = AXES[self.sweep.name].title
+            title = QUANTITIES[self.sweep.name].title
             said.append(f"a sweep of {len(self.sweep)} {title}s from {self.slips}")
         return ", ".join(said)
 
@@ -188,17 +184,17 @@ class Envelope:
             return ""
         name, values = self.sweep.name, self.sweep.values
         ends = " to ".join(_number(name, end) for end in (values.min(), values.max()))
-        return f"{ends}{_unit(AXES[name])}"
+        return f"{ends}{_unit(name)}"
 
 
 def _number(name: str, value: float) -> str:
     digits = ".3g" if name in ("pressure", "slip_ratio") else ".0f"
-    digits = ".1f" if AXES[name].dimension == "angle" else digits
-    return f"{float(AXES[name].told(value)):{digits}}"
+    digits = ".1f" if QUANTITIES[name].dimension == "angle" else digits
+    return f"{float(QUANTITIES[name].told(value)):{digits}}"
 
 
-def _unit(axis: Axis) -> str:
-    return "" if axis.unit == "1" else f" {axis.unit}"
+def _unit(name: str) -> str:
+    return f" {words}" if (words := QUANTITIES[name].words) else ""
 
 
 def _campaigns(points: Any, name: str) -> Range:
@@ -211,7 +207,8 @@ def _campaigns(points: Any, name: str) -> Range:
         )
     if not np.isfinite(values).all() or (axis.positive and not (values > 0.0).all()):
         raise ParameterError(
-            f"envelope: the campaign does not tell its {axis.title} in every run; declare the "
+            f"envelope: the campaign does not tell its {axis.quantity.title} in every run; declare "
+            "the "
             f"range with --{name.replace('_', '-')}-range"
         )
     low, high = float(values.min()), float(values.max())

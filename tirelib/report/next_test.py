@@ -10,6 +10,7 @@ from tirelib.arrays import FloatArray
 from tirelib.planning.criterion import NOTHING, RESOLVED, NextTest, PairForecast
 from tirelib.planning.document import Plan, advice, plan_document
 from tirelib.planning.envelope import AXES
+from tirelib.quantities import QUANTITIES
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import Table, number, numbers
 from tirelib.report.parts_page import Part, write_parts_page
@@ -119,7 +120,7 @@ def _runs(test: NextTest) -> Table:
         "Possible runs",
         [
             "rank",
-            *[_heading(name) for name in names],
+            *[QUANTITIES[name].heading for name in names],
             *["sweep"] * len(swept),
             "separation",
             "std",
@@ -132,15 +133,10 @@ def _runs(test: NextTest) -> Table:
     )
 
 
-def _heading(name: str) -> str:
-    axis = AXES[name]
-    return axis.title if axis.unit == "1" else f"{axis.title} [{axis.unit}]"
-
-
 def _told(test: NextTest, point: FloatArray) -> list[str]:
     """Return a point's conditions in their units."""
     pairs = zip(test.envelope.names, point, strict=True)
-    return [number(float(AXES[name].told(value)), 4) for name, value in pairs]
+    return [number(float(QUANTITIES[name].told(value)), 4) for name, value in pairs]
 
 
 def _envelope_text(test: NextTest) -> str:
@@ -152,8 +148,8 @@ def _envelope_text(test: NextTest) -> str:
     text = f"Envelope: from {low} to {high}."
     if envelope.sweep is not None:
         name, values = envelope.sweep.name, envelope.sweep.values
-        slips = ", ".join(f"{AXES[name].told(value):.3g}" for value in values)
-        text += f" Every run is a sweep: {_heading(name)} {slips}."
+        slips = ", ".join(f"{QUANTITIES[name].told(value):.3g}" for value in values)
+        text += f" Every run is a sweep: {QUANTITIES[name].heading} {slips}."
     if open_:
         wider = ", ".join(f"{name} by {100 * AXES[name].wider:.0f} %" for name in open_)
         text += (
@@ -191,14 +187,17 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
     panels = np.unique(test.points[shown, panel]) if panel is not None else np.zeros(1)
     of_panel = test.points[:, panel] if panel is not None else np.zeros(len(test.points))
     top = max(float(pair.separation[shown].max()), 1.0)
-    across = np.round(AXES[names[x]].told(xs), 2)
+    across = np.round(QUANTITIES[names[x]].told(xs), 2)
     upward = np.round(_upward(test, y, ys), 2)
     hover = _hover(names[x], names[y] if y is not None else None)
+    pressure = QUANTITIES["pressure"]
     figure = make_subplots(
         cols=len(panels),
         shared_yaxes=True,
         horizontal_spacing=0.03,
-        subplot_titles=[f"{AXES['pressure'].told(p):.3g} bar" for p in panels] if panel else None,
+        subplot_titles=[f"{pressure.told(p):.3g} {pressure.unit}" for p in panels]
+        if panel
+        else None,
     )
     for column, level in enumerate(panels, start=1):
         grid = np.full((len(ys), len(xs)), np.nan)
@@ -220,7 +219,7 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
             row=1,
             col=column,
         )
-    at_best = AXES[names[x]].told(best[x]), float(_upward(test, y, height[0]))
+    at_best = QUANTITIES[names[x]].told(best[x]), float(_upward(test, y, height[0]))
     figure.add_trace(
         go.Scatter(
             x=[at_best[0]],
@@ -233,8 +232,8 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
         row=1,
         col=int(np.searchsorted(panels, of_panel[0])) + 1,
     )
-    figure.update_xaxes(title=_heading(names[x]))
-    figure.update_yaxes(title=_heading(names[y]) if y is not None else "", col=1)
+    figure.update_xaxes(title=QUANTITIES[names[x]].heading)
+    figure.update_yaxes(title=QUANTITIES[names[y]].heading if y is not None else "", col=1)
     if len(ys) == 1:
         figure.update_yaxes(tickvals=list(upward) if y is not None else [])
     styled_figure(
@@ -258,20 +257,20 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
         f"Separation of {_said(pair)}",
         note,
         figure,
-        [*[_heading(name) for name in names], "separation", "chance to resolve"],
+        [*[QUANTITIES[name].heading for name in names], "separation", "chance to resolve"],
         [_row(test, pair, k) for k in range(len(test.points))],
     )
 
 
 def _upward(test: NextTest, y: int | None, values: FloatArray) -> FloatArray:
     """Return a map's upward values in their unit."""
-    return np.asarray(values if y is None else AXES[test.envelope.names[y]].told(values))
+    return np.asarray(values if y is None else QUANTITIES[test.envelope.names[y]].told(values))
 
 
 def _hover(x: str, y: str | None) -> str:
-    upward = "" if y is None else f", %{{y}} {AXES[y].unit}"
+    upward = "" if y is None else f", %{{y}} {QUANTITIES[y].unit}"
     return (
-        f"%{{x}} {AXES[x].unit}{upward}: separation %{{z:.3g}}, chance "
+        f"%{{x}} {QUANTITIES[x].unit}{upward}: separation %{{z:.3g}}, chance "
         "%{customdata} %<extra></extra>"
     )
 
@@ -279,7 +278,7 @@ def _hover(x: str, y: str | None) -> str:
 def _row(test: NextTest, pair: PairForecast, k: int) -> list[float]:
     """Return a point as downloadable numbers."""
     conditions = zip(test.envelope.names, test.points[k], strict=True)
-    told = [float(f"{float(AXES[name].told(value)):.5g}") for name, value in conditions]
+    told = [float(f"{float(QUANTITIES[name].told(value)):.5g}") for name, value in conditions]
     return [*told, float(f"{pair.separation[k]:.5g}"), float(f"{pair.probability[k]:.4g}")]
 
 

@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 from tirelib.compare.force_curves import Curve, curves_of, ranked, slip_of
 from tirelib.compare.forces import UNITS, ForceComparison
 from tirelib.compare.strain import Comparison
+from tirelib.quantities import QUANTITIES
 from tirelib.report.explanation import fold_name
 from tirelib.report.figures.compare_forces import force_plots
 from tirelib.report.figures.compare_heat import DEGREES, heat_maps
@@ -24,11 +25,6 @@ from tirelib.report.figures.compare_plot import (
 from tirelib.report.figures.compare_waveforms import waveform_axes
 from tirelib.report.page import number, unit_name
 from tirelib.report.style import BLUE, INK, RED
-
-_SLIPS = {
-    "slip_angle": ("slip_angle", float(np.rad2deg(1.0)), "slip angle [deg] (ISO 8855)"),
-    "slip_ratio": ("slip_ratio", 1.0, "slip ratio [-] (ISO 8855)"),
-}
 
 
 def part_errors(told: Mapping[str, Any]) -> list[Plot]:
@@ -211,8 +207,9 @@ def force_curves(before: ForceComparison, after: ForceComparison) -> list[Plot]:
 
 def _force_curve(before: ForceComparison, after: ForceComparison, curve: Curve, name: str) -> Plot:
     unit, k = UNITS[before.quantity], curve.member
-    slip, factor, title = _SLIPS[slip_of(before.quantity)]
-    x, measured = factor * getattr(before.data, slip)[k], before.measured[k]
+    slip = slip_of(before.quantity)
+    title = QUANTITIES[slip].label
+    x, measured = QUANTITIES[slip].told(getattr(before.data, slip)[k]), before.measured[k]
     looks = ((before, "before", RED, "x"), (after, "after", BLUE, "circle"))
     columns = [x, measured]
     values: list[Trace] = [

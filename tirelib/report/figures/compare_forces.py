@@ -11,6 +11,7 @@ from tirelib.compare.forces import UNITS, ForceComparison
 from tirelib.compare.sentences import told
 from tirelib.identify.error_bands import levels
 from tirelib.identify.force_points import CELL_ANGLE
+from tirelib.quantities import QUANTITIES
 from tirelib.report.figures.compare_plot import (
     Plot,
     confidence,
@@ -24,12 +25,9 @@ from tirelib.report.figures.compare_plot import (
 from tirelib.report.figures.compare_trends import SYMBOLS
 from tirelib.report.style import BLUE, CATEGORIES, FAINT, INK, RED
 
-_OVER = (
-    ("slip_angle", "slip angle [deg] (ISO 8855)", np.rad2deg(1.0)),
-    ("slip_ratio", "slip ratio [-] (ISO 8855)", 1.0),
-    ("camber", "camber [deg] (ISO 8855)", np.rad2deg(1.0)),
-    ("load", "load [N]", 1.0),
-    ("pressure", "inflation pressure [bar]", 1e-5),
+_OVER = tuple(
+    (name, QUANTITIES[name].label, float(QUANTITIES[name].told(1.0)))
+    for name in ("slip_angle", "slip_ratio", "camber", "load", "pressure")
 )
 
 

@@ -7,9 +7,10 @@ import plotly.graph_objects as go
 
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.compare.document import edge_value
-from tirelib.compare.sentences import UNITS, told
+from tirelib.compare.sentences import told
 from tirelib.compare.strain import Comparison
 from tirelib.identify.error_bands import levels
+from tirelib.quantities import QUANTITIES
 from tirelib.report.figures.compare_plot import (
     ANGLE_TITLE,
     Plot,
@@ -21,15 +22,7 @@ from tirelib.report.style import millimetres
 from tirelib.waveforms import GRID
 
 DEGREES = np.rad2deg(GRID)
-NAMES = {
-    "load": "load",
-    "pressure": "inflation pressure",
-    "speed": "speed",
-    "slip_angle": "slip angle",
-    "camber": "camber",
-    "slip_ratio": "slip ratio",
-    "gage": "gage",
-}
+NAMES = {name: quantity.title for name, quantity in QUANTITIES.items()} | {"gage": "gage"}
 SIGN = "Red: the model shows too much tension (too little compression); blue: too much compression."
 
 
@@ -41,7 +34,7 @@ def heat_maps(found: Comparison) -> list[Plot]:
         rows = [(told(factor.name, v), edge_value(factor.name, v)) for v in factor.values]
         data = np.stack([found.difference[m].mean(axis=0) for m in members])
         count = [int(m.sum()) for m in members]
-        unit = UNITS[factor.name][0]
+        unit = QUANTITIES[factor.name].words
         plots.append(_map(found, data, rows, count, factor.name, unit))
     return plots
 
@@ -160,7 +153,7 @@ def _map(
         showgrid=False,
     )
     styled_figure(figure, 200 + 34 * len(labels))
-    axes = " (ISO 8855)" if name in ("slip_angle", "camber", "slip_ratio", "gage") else ""
+    axes = " (ISO 8855)" if name == "gage" or QUANTITIES[name].signed else ""
     return Plot(
         f"heat-{name.replace('_', '-')}",
         f"By {NAMES[name]}{axes}",

@@ -9,10 +9,11 @@ from tirelib.arrays import BoolArray, FloatArray
 from tirelib.compare.document import edge_value
 from tirelib.compare.runs import Factor
 from tirelib.compare.sectors import SECTORS
-from tirelib.compare.sentences import UNITS, told
+from tirelib.compare.sentences import told
 from tirelib.compare.set_points import NAMES
 from tirelib.compare.strain import Comparison
 from tirelib.compare.tracks import Track
+from tirelib.quantities import QUANTITIES
 from tirelib.report.figures.compare_heat import NAMES as CONDITIONS
 from tirelib.report.figures.compare_plot import Plot, confidence, styled_figure
 from tirelib.report.style import BLACK, BLUE, CATEGORIES, FAINT, RED
@@ -51,7 +52,7 @@ def run_means(found: Comparison) -> FloatArray:
 
 def _trend(found: Comparison, factor: Factor) -> Plot:
     means = 1e6 * run_means(found)
-    unit, _ = UNITS[factor.name]
+    unit = QUANTITIES[factor.name].words
     x = np.array([edge_value(factor.name, float(v)) for v in factor.values])
     figure = make_subplots(
         rows=2,
