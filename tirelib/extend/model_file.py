@@ -1,6 +1,6 @@
 """A model file after an effect was added or removed, and the way back."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +10,7 @@ from tirelib import __version__
 from tirelib.diagnose.held_out import pooled
 from tirelib.errors import FormatError
 from tirelib.extend.extension import Extension
+from tirelib.extend.step import Step
 from tirelib.model.base import BARE, coordinates
 from tirelib.parameters import NUMBERS, Number, TireFile
 from tirelib.parameters.tire import range_fault
@@ -24,28 +25,102 @@ def extended_file(file: TireFile, done: Extension, data_hash: str) -> TireFile:
         If a fitted number lies where no tire's can.
     """
     name = done.runs.waves.header.name
-    numbers = dict(file.numbers)
-    faults = []
-    for index, coordinate in enumerate(coordinates(done.after.values)):
-        value = float(done.after.values[coordinate.name])
-        fit_std = coordinate.spread(value, float(np.sqrt(done.after.covariance[index, index])))
-        if (fault := range_fault(coordinate.name, value)) is not None:
-            faults.append(f"{coordinate.name} after the fit: {fault}; the effect is not added")
-        elif np.isfinite(value):
+    fitted = {c.name: (float(done.after.values[c.name]), c) for c in coordinates(done.after.values)}
+    refuse_beyond({name: value for name, (value, _) in fitted.items()})
+    numbers = {}
+    for index, (value, coordinate) in enumerate(fitted.values()):
+        if np.isfinite(value):
             numbers[coordinate.name] = _number(
                 file.numbers.get(coordinate.name),
                 value,
-                fit_std,
+                coordinate.spread(value, float(np.sqrt(done.after.covariance[index, index]))),
                 coordinate.unit == 0.0,
                 f"strain waveforms of {name}, {len(done.runs.waves)} straight runs",
             )
+    errors = {
+        "error_before": done.given.value,
+        "error_after": done.reached.value,
+        "floor": done.floor,
+        "heldout_error_before": pooled(done.held_before, done.folds),
+        "heldout_error_after": pooled(done.held_after, done.folds),
+    }
+    unit = "noise" if done.given.known else "ustrain"
+    entry = history_entry(file, done, errors, unit, tuple(fitted))
+    return stepped(file, done, numbers, entry | {"campaign": name, "data_sha256": data_hash})
+
+
+def refuse_beyond(values: Mapping[str, float]) -> None:
+    """Refuse fitted values, by name in a file, that lie where no tire's can.
+
+    Raises
+    ------
+    FormatError
+        With all of them.
+    """
+    faults = [
+        f"{name} after the fit: {fault}; the effect is not added"
+        for name, value in values.items()
+        if (fault := range_fault(name, value)) is not None
+    ]
     if faults:
         raise FormatError(faults)
-    history = [*file.extra.get("history", []), _entry(file, done, data_hash)]
-    effects = [*_brush_effects(file, done), *_effects(file, done)]
-    return replace(
-        file, numbers=numbers, extra={**file.extra, "effects": effects, "history": history}
-    )
+
+
+def history_entry(
+    file: TireFile, done: Step[Any], errors: Mapping[str, float], unit: str, names: Sequence[str]
+) -> dict[str, Any]:
+    """Return what the history holds of a step, and of the file before it.
+
+    Parameters
+    ----------
+    file : TireFile
+        Before the step.
+    done : Step
+    errors : mapping
+        By name; one that is not known is left out.
+    unit : str
+        Of the errors: without noise they stand under names that end in it.
+    names : sequence of str
+        Numbers of the file that the step wrote.
+    """
+    suffix = "" if unit == "noise" else f"_{unit}"
+    return {
+        "action": done.action,
+        "effect": done.effect.name,
+        "strength": plain(done.strength),
+        "std": plain(done.std),
+        "unit": done.effect.unit,
+        **{f"{name}{suffix}": value for name, value in errors.items() if np.isfinite(value)},
+        "tirelib": __version__,
+        "before": {
+            "effects": list(file.extra.get("effects", [])),
+            "written": list(names),
+            "numbers": {n: written(file.numbers[n]) for n in names if n in file.numbers},
+        },
+    }
+
+
+def stepped(
+    file: TireFile, done: Step[Any], numbers: Mapping[str, Number], entry: Mapping[str, Any]
+) -> TireFile:
+    """Return a file with the numbers, the effects and the history entry of a step.
+
+    Effects of the file that the step did not fit stay as they are.
+    """
+    fitted = {effect.name for effect in (*done.before.effects, *done.after.effects)}
+    kept = [each for each in file.extra.get("effects", []) if each.get("effect") not in fitted]
+    effects = [
+        {
+            "effect": effect.name,
+            "strength": plain(done.after.strengths[k]),
+            "std": plain(done.after.strength_std(k)),
+            "unit": effect.unit,
+        }
+        for k, effect in enumerate(done.after.effects)
+    ]
+    history = [*file.extra.get("history", []), entry]
+    extra = {**file.extra, "effects": [*kept, *effects], "history": history}
+    return replace(file, numbers={**file.numbers, **numbers}, extra=extra)
 
 
 def undone_file(file: TireFile) -> tuple[TireFile, Mapping[str, Any]]:
@@ -91,60 +166,6 @@ def _number(old: Number | None, value: float, fit_std: float, factor: bool, sour
     if isinstance(interval, list) and len(interval) == 2:
         notes["interval_SI"] = [value + share * (float(end) - old.value) for end in interval]
     return Number(value, std, "fitted", source, notes)
-
-
-def _effects(file: TireFile, done: Extension) -> list[dict[str, Any]]:
-    """Return the effects of strain with the strengths of the last fit."""
-    out = []
-    for index, effect in enumerate(done.after.effects):
-        deviation = done.after.strength_std(index)
-        out.append(
-            {
-                "effect": effect.name,
-                "strength": plain(done.after.strengths[index]),
-                "std": plain(deviation),
-                "unit": effect.unit,
-            }
-        )
-    return out
-
-
-def _brush_effects(file: TireFile, done: Extension) -> list[dict[str, Any]]:
-    """Return the file's effects that a fit to strain leaves alone."""
-    fitted = {effect.name for effect in (*done.before.effects, *done.after.effects)}
-    return [each for each in file.extra.get("effects", []) if each.get("effect") not in fitted]
-
-
-def _entry(file: TireFile, done: Extension, data_hash: str) -> dict[str, Any]:
-    header = done.runs.waves.header
-    # an error without noise is in another unit, under another name
-    suffix = "" if done.given.known else "_ustrain"
-    errors = {
-        "error_before": done.given.value,
-        "error_after": done.reached.value,
-        "floor": done.floor,
-        "heldout_error_before": pooled(done.held_before, done.folds),
-        "heldout_error_after": pooled(done.held_after, done.folds),
-    }
-    return {
-        "action": done.action,
-        "effect": done.effect.name,
-        "strength": plain(done.strength),
-        "std": plain(done.std),
-        "unit": done.effect.unit,
-        **{f"{name}{suffix}": value for name, value in errors.items() if np.isfinite(value)},
-        "campaign": header.name,
-        "data_sha256": data_hash,
-        "tirelib": __version__,
-        "before": {
-            "effects": list(file.extra.get("effects", [])),
-            "numbers": {
-                coordinate.name: written(file.numbers[coordinate.name])
-                for coordinate in coordinates(done.after.values)
-                if coordinate.name in file.numbers
-            },
-        },
-    }
 
 
 def plain(values: np.ndarray) -> float | list[float]:
