@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from tirelib.errors import FormatError, ParameterError
 from tirelib.parameters import Tire, read_tire
-from tirelib.report.simulation import LARGEST_BELT_SPEED, Simulation, extreme, simulate
+from tirelib.report.simulation import LARGEST_BELT_SPEED, Simulation, simulate
 from tirelib.report.simulation_document import columns, point_document, write_curves
+from tirelib.report.simulation_peaks import extreme
 
 TIRE = read_tire("table-6-1").tire
 CONTACTS = pytest.mark.parametrize("contact", ["radial", "shear"])

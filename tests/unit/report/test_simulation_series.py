@@ -5,7 +5,8 @@ import pytest
 
 from tirelib.parameters import read_tire
 from tirelib.report import simulation, simulation_series
-from tirelib.report.simulation import Peaks, simulate
+from tirelib.report.simulation import simulate
+from tirelib.report.simulation_peaks import Peaks
 from tirelib.report.simulation_series import (
     LEAST_MODES,
     MOST_MODES,
