@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from tirelib.brush.predict import PointForces
-from tirelib.compare.model import UsedEffect, _used
+from tirelib.compare.model import UsedEffect, effects_of
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.errors import FormatError, ParameterError
+from tirelib.errors import FormatError
 from tirelib.identify.brush_model import BrushModel, brush_of
 from tirelib.identify.force_bench import Changes, ForceBench
 from tirelib.identify.force_points import ForcePoints
@@ -79,16 +79,7 @@ def force_model_of(file: TireFile, effects: Mapping[str, Effect] = CATALOGUE) ->
     FormatError
         If an effect is unknown or without strength; with every fault.
     """
-    faults: list[str] = []
-    used = []
-    entries = file.extra.get("effects", [])
-    if not isinstance(entries, list):
-        raise FormatError(f"{file.name}: effects is no list; write [[effects]] tables")
-    for i, entry in enumerate(entries):
-        try:
-            used.append(_used(entry, effects))
-        except ParameterError as error:
-            faults.append(f"{file.name}, effects[{i}]: {error}")
+    used, faults = effects_of(file, effects)
     if faults:
         raise FormatError(faults)
     brush = brush_of(file)

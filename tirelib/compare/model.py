@@ -94,16 +94,7 @@ def model_of(file: TireFile, effects: Mapping[str, Effect] = CATALOGUE) -> Model
     FormatError
         If an effect is unknown, without strength, or the kind of ring is; with every fault.
     """
-    faults: list[str] = []
-    used = []
-    entries = file.extra.get("effects", [])
-    if not isinstance(entries, list):
-        raise FormatError(f"{file.name}: effects is no list; write [[effects]] tables")
-    for i, entry in enumerate(entries):
-        try:
-            used.append(_used(entry, effects))
-        except ParameterError as error:
-            faults.append(f"{file.name}, effects[{i}]: {error}")
+    used, faults = effects_of(file, effects)
     kind = file.extra.get("model", {}).get("ring", RINGS[0])
     if kind not in RINGS:
         faults.append(f"{file.name}, model.ring = {kind!r}; allowed are {', '.join(RINGS)}")
@@ -112,12 +103,34 @@ def model_of(file: TireFile, effects: Mapping[str, Effect] = CATALOGUE) -> Model
     return Model(
         file.name,
         values_of(file.tire),
-        tuple(used),
+        used,
         kind == RINGS[0],
         tuple(item for item in file.extra.get("history", []) if isinstance(item, dict)),
         dict(file.extra.get("provenance", {})),
         {name: f"{number.kind}: {number.source}" for name, number in file.numbers.items()},
     )
+
+
+def effects_of(
+    file: TireFile, effects: Mapping[str, Effect]
+) -> tuple[tuple[UsedEffect, ...], list[str]]:
+    """Return the effects of a file, of strain and of the brush, and every fault in them.
+
+    Raises
+    ------
+    FormatError
+        If the file's effects are no list.
+    """
+    used, faults = [], []
+    entries = file.extra.get("effects", [])
+    if not isinstance(entries, list):
+        raise FormatError(f"{file.name}: effects is no list; write [[effects]] tables")
+    for i, entry in enumerate(entries):
+        try:
+            used.append(_used(entry, effects))
+        except ParameterError as error:
+            faults.append(f"{file.name}, effects[{i}]: {error}")
+    return tuple(used), faults
 
 
 def _used(entry: object, effects: Mapping[str, Effect]) -> UsedEffect:

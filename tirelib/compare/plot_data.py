@@ -31,10 +31,12 @@ from tirelib.model.chain import Changes
 from tirelib.model.solution import by_values, solved
 from tirelib.model.state import Operating
 from tirelib.parameters import TireFile
+from tirelib.quantities import QUANTITIES
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID
 
 FORMAT = "tirelib-plot-data/1"
+CONDITIONS = ("pressure", "speed", "slip_angle", "camber", "slip_ratio")
 STEP = 1e-3
 """Relative step of a brush's numbers."""
 Planted = Sequence[tuple[str, tuple[float, ...]]]
@@ -121,11 +123,7 @@ def _strain(found: Comparison) -> dict[str, Any]:
         "counted": counted,
         "order": waves.start,
         "load": c["Fz"],
-        "pressure": c["pressure"] / 1e5,
-        "speed": 3.6 * c["speed"],
-        "slip_angle": np.rad2deg(c["slip_angle"]),
-        "camber": np.rad2deg(c["camber"]),
-        "slip_ratio": c["slip_ratio"],
+        **{name: QUANTITIES[name].told(c[name]) for name in CONDITIONS},
         "edges": np.rad2deg(found.prediction.edges),
         "gages": np.array(lateral),
         "measured": 1e6 * found.chosen.strain,
@@ -197,13 +195,10 @@ def _forces(found: ForceComparison) -> dict[str, Any]:
         "quantity": np.array(found.quantity),
         "run": found.run,
         "order": data.time,
-        "load": data.load,
-        "pressure": data.pressure / 1e5,
-        "speed": 3.6 * data.speed,
-        "temperature": data.temperature - 273.15,
-        "slip_angle": np.rad2deg(data.slip_angle),
-        "camber": np.rad2deg(data.camber),
-        "slip_ratio": data.slip_ratio,
+        **{
+            name: QUANTITIES[name].told(getattr(data, name))
+            for name in ("load", "temperature", *CONDITIONS)
+        },
         "measured": found.measured,
         "model": found.predicted,
         "difference": found.difference,

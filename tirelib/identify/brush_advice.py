@@ -210,11 +210,17 @@ def _joined(parts: Sequence[ForceData]) -> ForceData:
         np.concatenate([getattr(part, name) for part in parts])
         for name in ("load", "pressure", "slip_angle", "slip_ratio", "camber")
     )
-    n = load.size
-    one = np.ones(n)
-    return ForceData(
-        load, pressure, angle, ratio, camber, np.full(n, np.nan), one, one, one, np.arange(n)
-    )
+    return _steady(load, pressure, angle, ratio, camber)
+
+
+def _steady(
+    load: FloatArray, pressure: FloatArray, angle: FloatArray, ratio: FloatArray, camber: FloatArray
+) -> ForceData:
+    """Return steady points with forces of one: only the slopes at them matter."""
+    one = np.ones(load.size)
+    unknown = np.full(load.size, np.nan)
+    block = np.arange(load.size)
+    return ForceData(load, pressure, angle, ratio, camber, unknown, one, one, one, block)
 
 
 def _half(study: Study, data: ForceData) -> FloatArray | None:
@@ -223,20 +229,7 @@ def _half(study: Study, data: ForceData) -> FloatArray | None:
 
 
 def _points(at: Conditions) -> ForceData:
-    n = at.load.size
-    one = np.ones(n)
-    return ForceData(
-        at.load,
-        at.pressure,
-        at.slip_angle,
-        at.slip_ratio,
-        at.camber,
-        np.full(n, np.nan),
-        one,
-        one,
-        one,
-        np.arange(n),
-    )
+    return _steady(at.load, at.pressure, at.slip_angle, at.slip_ratio, at.camber)
 
 
 def _scale(study: Study, force: str) -> float:
@@ -252,11 +245,7 @@ def _scale(study: Study, force: str) -> float:
 def _runs(
     study: Study, slips: FloatArray, load: float, pressure: float, *, along: bool = False
 ) -> ForceData:
-    """Return steady runs with forces that are as predicted: only their slopes matter."""
-    n = slips.size
-    zero, none = np.zeros(n), np.full(n, np.nan)
-    one = np.ones(n)
-    slip: Sequence[FloatArray] = (zero, slips) if along else (slips, zero)
-    return ForceData(
-        load * one, pressure * one, slip[0], slip[1], zero, none, one, one, one, np.arange(n)
-    )
+    """Return steady runs over one of the slips."""
+    one, zero = np.ones(slips.size), np.zeros(slips.size)
+    angle, ratio = (zero, slips) if along else (slips, zero)
+    return _steady(load * one, pressure * one, angle, ratio, zero)

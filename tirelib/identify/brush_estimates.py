@@ -12,6 +12,7 @@ from tirelib.identify.brush_misfit import Term
 from tirelib.identify.brush_properties import property_terms, slope_terms
 from tirelib.identify.brush_study import Study, stiffness_at
 from tirelib.identify.error_bands import levels
+from tirelib.identify.estimate import Estimate
 
 WIDEST = 0.25
 """Relative half-width of a 95 % interval up to which a number is called identifiable."""
@@ -29,36 +30,6 @@ without a bend has: 0.17 at middle loads, 0.25 at the lowest.
 _STEP = 1e-6
 _FAR = 5.0
 """Longest reach of an interval, in z; a parameter's ends also stay in its allowed range."""
-
-
-@dataclass(frozen=True, slots=True)
-class BrushEstimate:
-    """One number of the brush, SI.
-
-    Attributes
-    ----------
-    name : str
-        Of `tirelib.identify.brush_law.SPECS`.
-    value, std : float
-        Structural misfit included.
-    low, high : float
-        95 % interval; not symmetric for numbers that are fitted by their logarithm.
-    fit_std : float
-        What the scatter of points and blocks gives alone.
-    flags : tuple of str
-        at_boundary, not_identifiable, beyond_geometry.
-    helps : str
-        The run that would tell it best; empty where it is told.
-    """
-
-    name: str
-    value: float
-    std: float
-    low: float
-    high: float
-    fit_std: float
-    flags: tuple[str, ...]
-    helps: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +53,7 @@ class SlipStiffness:
     high: float
 
 
-def estimates_of(study: Study, *, free_radius: float | None = None) -> tuple[BrushEstimate, ...]:
+def estimates_of(study: Study, *, free_radius: float | None = None) -> tuple[Estimate, ...]:
     """Return the fitted numbers with intervals and flags.
 
     Parameters
@@ -110,7 +81,7 @@ def estimates_of(study: Study, *, free_radius: float | None = None) -> tuple[Bru
         if name == "half_length" and free_radius is not None and value > 0.6 * free_radius:
             flags.append("beyond_geometry")
         out.append(
-            BrushEstimate(name, value, unit * error.std, low, high, unit * error.own, tuple(flags))
+            Estimate(name, value, unit * error.std, low, high, unit * error.own, tuple(flags))
         )
     return tuple(out)
 
@@ -154,11 +125,6 @@ def _errors(
             high = max(high, min(shift + reach, _FAR))
         out.append(_Error(low, high, 0.5 * (high - low) / study.quantile, float(np.sqrt(own))))
     return tuple(out)
-
-
-def with_help(estimate: BrushEstimate, helps: str) -> BrushEstimate:
-    """Return an estimate with advice."""
-    return replace(estimate, helps=helps)
 
 
 def slip_stiffness(study: Study) -> tuple[SlipStiffness, ...]:

@@ -125,11 +125,6 @@ def brush_of(file: TireFile) -> BrushModel:
     return BrushModel(file.name, MappingProxyType(values), reference, tire)
 
 
-def has_brush(file: TireFile) -> bool:
-    """Whether a file states a brush."""
-    return all(STORED[name] in file.numbers for name in NEEDED)
-
-
 def stored_number(
     name: str,
     value: float,

@@ -7,6 +7,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
+from tirelib.identify.estimate import Estimate
 from tirelib.identify.identify import Identification
 from tirelib.parameters import FIELDS, TireFile
 from tirelib.ring.frequencies import rim_stiffness
@@ -29,7 +30,7 @@ def identification_document(campaign: Campaign, found: Identification) -> dict[s
         "rms_ustrain": 1e6 * fit.rms,
         "delay_us": 1e6 * fit.delay,
         "strain_rms_ustrain": 1e6 * float(np.sqrt(np.mean(runs.strain**2))),
-        "parameters": [_parameter(found, k) for k in range(len(found.estimates))],
+        "parameters": [_parameter(each) for each in found.estimates],
         "correlation": found.correlation,
         "vertical_stiffness": _vertical_stiffness(found),
         "rim_stiffness": _rim_stiffness(found),
@@ -38,26 +39,13 @@ def identification_document(campaign: Campaign, found: Identification) -> dict[s
     }
 
 
-def _parameter(found: Identification, k: int) -> dict[str, Any]:
-    estimate = found.estimates[k]
-    dimension = FIELDS[estimate.name].dimension
+def _parameter(each: Estimate) -> dict[str, Any]:
+    field = FIELDS[each.name]
 
     def edge(value: float) -> float:
-        return float(from_si(value, estimate.unit, dimension))
+        return float(from_si(value, field.unit, field.dimension))
 
-    low, high = sorted((edge(estimate.low), edge(estimate.high)))
-    return {
-        "name": estimate.name,
-        "meaning": FIELDS[estimate.name].meaning,
-        "value": edge(estimate.value),
-        "std": abs(edge(estimate.std)),
-        "low": low,
-        "high": high,
-        "fit_std": abs(edge(estimate.fit_std)),
-        "unit": estimate.unit,
-        "flags": list(estimate.flags),
-        "helps": estimate.helps,
-    }
+    return each.entry(each.name, edge, abs(edge(1.0)))
 
 
 def _vertical_stiffness(found: Identification) -> dict[str, float | None]:

@@ -1,7 +1,7 @@
 """Identify the brush of a tire from the forces of a campaign."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -10,16 +10,11 @@ from tirelib.arrays import IntArray
 from tirelib.campaign import Campaign
 from tirelib.errors import TirelibError
 from tirelib.identify.brush_advice import advice
-from tirelib.identify.brush_estimates import (
-    BrushEstimate,
-    SlipStiffness,
-    estimates_of,
-    slip_stiffness,
-    with_help,
-)
+from tirelib.identify.brush_estimates import SlipStiffness, estimates_of, slip_stiffness
 from tirelib.identify.brush_fit import BrushFit, fit_brush
 from tirelib.identify.brush_model import stored_number
 from tirelib.identify.brush_study import study_of
+from tirelib.identify.estimate import Estimate
 from tirelib.identify.force_checks import ANGLE_SPAN
 from tirelib.identify.force_data import ForceData, force_data
 from tirelib.identify.force_notes import force_notes
@@ -49,7 +44,7 @@ class ForceIdentification:
     Attributes
     ----------
     fit : BrushFit
-    estimates : tuple of BrushEstimate
+    estimates : tuple of Estimate
     stiffness : tuple of SlipStiffness
         By load and pressure.
     comparison : PressureComparison or None
@@ -61,7 +56,7 @@ class ForceIdentification:
     """
 
     fit: BrushFit
-    estimates: tuple[BrushEstimate, ...]
+    estimates: tuple[Estimate, ...]
     stiffness: tuple[SlipStiffness, ...]
     comparison: PressureComparison | None
     notes: tuple[str, ...]
@@ -108,7 +103,7 @@ def identify_forces(
     if any("not_identifiable" in each.flags for each in estimates):
         helps = advice(study)
         estimates = tuple(
-            with_help(each, helps[each.name]) if "not_identifiable" in each.flags else each
+            replace(each, helps=helps[each.name]) if "not_identifiable" in each.flags else each
             for each in estimates
         )
     notes += _remarks(fit, estimates, data)
@@ -145,7 +140,7 @@ def _with_pressure(data: ForceData, ring: Tire, notes: list[str]) -> tuple[Force
     return data, ring
 
 
-def _remarks(fit: BrushFit, estimates: tuple[BrushEstimate, ...], data: ForceData) -> list[str]:
+def _remarks(fit: BrushFit, estimates: tuple[Estimate, ...], data: ForceData) -> list[str]:
     """Return what a reader should know of this fit."""
     out = []
     angles = np.unique(np.round(np.abs(np.rad2deg(data.slip_angle)), 1))
@@ -215,19 +210,13 @@ def _told(data: ForceData, chosen: IntArray, notes: list[str]) -> IntArray:
 
 
 def _numbers(
-    campaign: Campaign, fit: BrushFit, estimates: tuple[BrushEstimate, ...], points: int
+    campaign: Campaign, fit: BrushFit, estimates: tuple[Estimate, ...], points: int
 ) -> dict[str, Number]:
     """Return the brush as numbers of a tire file."""
     source = f"forces of {campaign.header.name}, {' and '.join(fit.rmse)} at {points} points"
     pairs = []
     for each in estimates:
-        notes: dict[str, object] = {
-            "interval_SI": [each.low, each.high],
-            "flags": list(each.flags),
-        }
-        if each.helps:
-            notes["helps"] = each.helps
-        pairs.append(stored_number(each.name, each.value, each.std, "fitted", source, notes))
+        pairs.append(stored_number(each.name, each.value, each.std, "fitted", source, each.notes))
     for name, (value, why) in fit.held.items():
         if name == "half_length" and fit.tire is not None:
             continue

@@ -5,10 +5,11 @@ from typing import Any
 import numpy as np
 
 from tirelib.campaign import Campaign
-from tirelib.identify.brush_estimates import BrushEstimate, SlipStiffness
+from tirelib.identify.brush_estimates import SlipStiffness
 from tirelib.identify.brush_model import STORED
 from tirelib.identify.document import FORMAT, identification_document
 from tirelib.identify.error_bands import BandError
+from tirelib.identify.estimate import Estimate
 from tirelib.identify.forces import ForceIdentification
 from tirelib.identify.lateral_force import PressureComparison
 from tirelib.identify.whole import Whole
@@ -130,26 +131,11 @@ def pressure_document(found: PressureComparison) -> dict[str, Any]:
     return {"unit": "N", "stiffness": "each load and pressure its own", "table": rows}
 
 
-def _parameter(each: BrushEstimate) -> dict[str, Any]:
-    stored = STORED[each.name]
-    low, high = sorted((_edge(each.name, each.low), _edge(each.name, each.high)))
-    value = _edge(each.name, each.value)
-    rate = abs(_edge(each.name, each.value * (1.0 + 1e-6) or 1e-6) - value) / (
-        abs(each.value) * 1e-6 or 1e-6
-    )
-    return {
-        "name": stored,
-        "meaning": NUMBERS[stored].meaning,
-        "value": value,
-        "std": rate * each.std,
-        "low": low,
-        "high": high,
-        "interval": [low, high],
-        "fit_std": rate * each.fit_std,
-        "unit": NUMBERS[stored].unit,
-        "flags": list(each.flags),
-        "helps": each.helps,
-    }
+def _parameter(each: Estimate) -> dict[str, Any]:
+    step = 1e-6 * abs(each.value) or 1e-6
+    rate = abs(_edge(each.name, each.value + step) - _edge(each.name, each.value)) / step
+    told = each.entry(STORED[each.name], lambda value: _edge(each.name, value), rate)
+    return told | {"interval": [told["low"], told["high"]]}
 
 
 def _edge(name: str, value: float) -> float:

@@ -12,12 +12,13 @@ from tirelib.campaign import Campaign, CampaignHeader
 from tirelib.errors import ParameterError, TirelibError
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.discrepancy import COARSE, Discrepancy
+from tirelib.identify.estimate import Estimate
 from tirelib.identify.next_run import NextRun, next_run
 from tirelib.identify.strain_notes import gage_notes, run_notes
 from tirelib.identify.structure import STRUCTURE_STD, WITHOUT_SHEAR
 from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
 from tirelib.model.base import Coordinate, coordinates, values_of
-from tirelib.parameters import FIELDS, Number, Tire, TireFile
+from tirelib.parameters import FIELDS, Number, TireFile
 from tirelib.threads import one_thread
 from tirelib.units import from_si
 from tirelib.waveforms import Waveforms, measure_waveforms
@@ -59,36 +60,6 @@ BASES = ("plain", "dissertation")
 _RADIAL = (1.0, 2.4e5)
 _TANGENTIAL = (0.35, 1.1e5)
 """Slope by pressure [m] and offset [N/m^2] of sidewall stiffnesses, about those of Table 6-3."""
-
-
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """One identified number, SI.
-
-    Attributes
-    ----------
-    name, unit : str
-        Unit of the SI value's field in a tire file.
-    value, std : float
-    low, high : float
-        95 % interval, structural misfit included; not symmetric where the surface is no parabola.
-    fit_std : float
-        What the fit alone knows.
-    flags : tuple of str
-        not_identifiable, at_boundary, not_quadratic.
-    helps : str
-        The run or test that would make it identifiable; empty when it is.
-    """
-
-    name: str
-    unit: str
-    value: float
-    std: float
-    low: float
-    high: float
-    fit_std: float
-    flags: tuple[str, ...]
-    helps: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,14 +301,12 @@ def estimate(fit: WaveformFit, k: int, start: TireFile) -> Estimate:
         flags.append("not_quadratic")
     return Estimate(
         name,
-        FIELDS[name].unit,
         value,
         float(np.hypot(fit_std, structure)),
         low,
         high,
         fit_std,
         tuple(flags),
-        "",
     )
 
 
@@ -377,13 +346,9 @@ def _fitted_file(
     numbers = dict(start.numbers)
     source = f"strain waveforms of {campaign.header.name}, {len(runs.waves)} straight runs"
     for estimate in estimates:
-        notes: dict[str, object] = {
-            "interval_SI": [estimate.low, estimate.high],
-            "flags": list(estimate.flags),
-        }
-        if estimate.helps:
-            notes["helps"] = estimate.helps
-        numbers[estimate.name] = Number(estimate.value, estimate.std, "fitted", source, notes)
+        numbers[estimate.name] = Number(
+            estimate.value, estimate.std, "fitted", source, estimate.notes
+        )
     provenance = {
         "method": "whole waveforms, Gauss-Newton with structural misfit",
         "tirelib": __version__,
@@ -393,8 +358,3 @@ def _fitted_file(
         "rms_microstrain": 1e6 * fit.rms,
     }
     return TireFile(start.name, numbers, {"provenance": provenance})
-
-
-def identified_tire(identification: Identification) -> Tire:
-    """Return the identified values alone."""
-    return identification.tire.tire

@@ -12,7 +12,7 @@ observation narrows.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -254,15 +254,10 @@ def _press_test(fit: WaveformFit) -> Test | None:
     """Return the vertical stiffness in the middle of the campaign, from two loads."""
     have = fit.cost.data.points
     load, pressure = float(np.median(have.load)), float(np.median(have.pressure))
-    points = have.take(np.zeros(2, dtype=int))
-    points = Operating(
-        *[
-            {
-                "load": load * np.array([1.0 - PRESS_SPAN, 1.0 + PRESS_SPAN]),
-                "pressure": np.full(2, pressure),
-            }.get(name, getattr(points, name))
-            for name in Operating.__slots__
-        ]
+    points = replace(
+        have.take(np.zeros(2, dtype=int)),
+        load=load * np.array([1.0 - PRESS_SPAN, 1.0 + PRESS_SPAN]),
+        pressure=np.full(2, pressure),
     )
     at = _solved(fit, points)
     if at is None:

@@ -8,7 +8,7 @@ import pytest
 from tests.unit.identify.test_brush_fit import LOADS, WIDE, make
 from tirelib.errors import CalibrationError, FormatError, ParameterError
 from tirelib.identify.brush_law import SPECS, Reference, predict
-from tirelib.identify.brush_model import STORED, brush_of, has_brush, stored_number
+from tirelib.identify.brush_model import STORED, brush_of, stored_number
 from tirelib.identify.ring_patch import half_lengths
 from tirelib.parameters import NUMBERS, Number, TireFile, read_tire, write_tire
 
@@ -91,8 +91,6 @@ def test_without_a_half_length_the_ring_gives_it() -> None:
 
 
 def test_a_file_without_brush_says_so() -> None:
-    assert not has_brush(BASE)
-    assert has_brush(tire_file(VALUES))
     with pytest.raises(CalibrationError, match=r"states no bristle_lateral: .* campaign with slip"):
         brush_of(BASE)
     with pytest.raises(CalibrationError, match=r"nor a complete ring \(ring_radius"):

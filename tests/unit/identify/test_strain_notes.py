@@ -11,7 +11,8 @@ from tests.unit.identify.model_waves import made_waves
 from tirelib.campaign import Campaign, RunPlan, read_campaign
 from tirelib.errors import CalibrationError
 from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.identify import Estimate, _contradictions, _with_run, start_file
+from tirelib.identify.estimate import Estimate
+from tirelib.identify.identify import _contradictions, _with_run, start_file
 from tirelib.identify.strain_notes import (
     broken_gages,
     gage_notes,
@@ -121,9 +122,7 @@ def test_gages_of_the_wrong_sign_or_unit_are_named(waves: Waveforms) -> None:
 
 def test_a_measured_length_that_the_strain_contradicts_is_said(waves: Waveforms) -> None:
     start = start_file(waves.header, straight_runs(waves), None)
-    estimate = Estimate(
-        "innerliner_offset", "mm", -3.2e-3, 1e-4, -3.4e-3, -3e-3, 1e-4, ("at_boundary",), ""
-    )
+    estimate = Estimate("innerliner_offset", -3.2e-3, 1e-4, -3.4e-3, -3e-3, 1e-4, ("at_boundary",))
     (said,) = _contradictions(start, (estimate,))
     assert "the strain says -3.2 mm" in said
     assert "campaign.toml says -3.3 mm" in said

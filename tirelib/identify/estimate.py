@@ -1,0 +1,73 @@
+"""An identified number of ring or brush with its interval, and as files and JSON hold it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from tirelib.parameters import NUMBERS
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """One identified number, SI.
+
+    Attributes
+    ----------
+    name : str
+        Of a tire's number, or of a parameter of the brush's law.
+    value, std : float
+        Structural misfit included.
+    low, high : float
+        95 % interval, structural misfit included; not symmetric where the surface is no parabola,
+        or the number is fitted by its logarithm.
+    fit_std : float
+        What the fit alone knows.
+    flags : tuple of str
+        not_identifiable, at_boundary, not_quadratic, beyond_geometry.
+    helps : str
+        The run or test that would make it identifiable; empty when it is.
+    """
+
+    name: str
+    value: float
+    std: float
+    low: float
+    high: float
+    fit_std: float
+    flags: tuple[str, ...]
+    helps: str = ""
+
+    @property
+    def notes(self) -> dict[str, object]:
+        """What a file holds beside value and deviation."""
+        notes: dict[str, object] = {
+            "interval_SI": [self.low, self.high],
+            "flags": list(self.flags),
+        }
+        return notes | ({"helps": self.helps} if self.helps else {})
+
+    def entry(self, stored: str, edge: Callable[[float], float], scale: float) -> dict[str, Any]:
+        """Return the number as JSON holds it, in the unit of a tire file.
+
+        Parameters
+        ----------
+        stored : str
+            Its name in a file.
+        edge : callable
+            From the number's SI value to that of the file in its unit.
+        scale : float
+            From its deviation to that in the file's unit.
+        """
+        low, high = sorted((edge(self.low), edge(self.high)))
+        return {
+            "name": stored,
+            "meaning": NUMBERS[stored].meaning,
+            "value": edge(self.value),
+            "std": scale * self.std,
+            "low": low,
+            "high": high,
+            "fit_std": scale * self.fit_std,
+            "unit": NUMBERS[stored].unit,
+            "flags": list(self.flags),
+            "helps": self.helps,
+        }
