@@ -9,6 +9,7 @@ import numpy as np
 from pages import DEMO
 from pages.cutoff_study import nearest_runs, study_cut_off
 from pages.figures.camber import figure_4_16
+from pages.figures.contact import figure_4_2
 from pages.figures.cutoff import figure_cut_off
 from pages.figures.slip_ratio import figure_4_17, figure_4_18
 from pages.figures.strain import figure_3_7, figure_4_1
@@ -236,7 +237,7 @@ def _parts(
                     "Contact shapes at the middle load (Fig. 4-2)",
                     "The contact grows on the outer side of the corner and shrinks on the inner "
                     "side.",
-                    lambda: figures.figure_4_2(set1.observations, set1.estimates),
+                    lambda: figure_4_2(set1.observations, set1.estimates),
                 ),
                 drawn["figure_4_3"],
             ],

@@ -14,7 +14,6 @@ from tirelib.report.figures.ring_panels import (
     SHEAR,
     STRAIN,
     Quantity,
-    deflection_labels,
     draw,
     half_width,
     inflation_labels,
@@ -23,6 +22,11 @@ from tirelib.report.simulation import Simulation
 from tirelib.report.style import BLACK, CATEGORIES, legend_below, new_figure, sequence, styled
 
 NAMES = {"radial": "radial tread springs only", "shear": "tread in compression and shear"}
+
+
+def deflection_labels(done: Simulation) -> list[str]:
+    """Return labels of the deflections."""
+    return [f"{1e3 * d0:g} mm" for d0 in np.round(done.deflection, 7)]
 
 
 @styled

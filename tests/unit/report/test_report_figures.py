@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pages.cutoff_study import nearest_runs, study_cut_off
 from pages.figures.camber import figure_4_16
+from pages.figures.contact import contact_area, figure_4_2
 from pages.figures.cutoff import figure_cut_off
 from pages.figures.live import LastTurn, Strip, figure_live
 from pages.figures.slip_ratio import figure_4_17, figure_4_18
@@ -22,7 +23,6 @@ from tirelib.errors import CalibrationError
 from tirelib.estimators.cornering import CorneringTrend
 from tirelib.report import figures
 from tirelib.report.accuracy import QUANTITIES
-from tirelib.report.figures.contact import contact_area
 from tirelib.report.figures.cornering import bend_factor
 
 
@@ -55,7 +55,7 @@ def live(world: World) -> Figure:
 DRAW: dict[str, Callable[[World], Figure]] = {
     "3_7": lambda w: figure_3_7(turns(w, "set1", 3)),
     "4_1": lambda w: figure_4_1(turns(w, "set1", 1)),
-    "4_2": lambda w: figures.figure_4_2(w.observations["set1"], w.estimates["set1"]),
+    "4_2": lambda w: figure_4_2(w.observations["set1"], w.estimates["set1"]),
     "4_3": lambda w: figures.figure_4_3(w.trained.means),
     "4_4": lambda w: figures.figure_4_4(w.trained),
     "4_5": lambda w: figures.figure_4_5(w.trained),

@@ -88,11 +88,6 @@ def load_labels(done: Simulation) -> list[str]:
     return [f"{load:.0f} N" for load in done.load]
 
 
-def deflection_labels(done: Simulation) -> list[str]:
-    """Return labels of the deflections."""
-    return [f"{1e3 * d0:g} mm" for d0 in np.round(done.deflection, 7)]
-
-
 def inflation_labels(done: Simulation) -> list[str]:
     """Return labels of the inflation pressures."""
     return [f"{1e-5 * p:g} bar" for p in done.inflation]
