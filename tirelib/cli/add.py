@@ -210,9 +210,10 @@ def _forces(
 
 def _say(document: dict[str, Any], effect: "Effect") -> None:
     from tirelib.report.explanation import unmoved
+    from tirelib.report.page import unit_name
 
     console = output()
-    unit = {"ustrain": "microstrain"}.get(document["error_unit"], document["error_unit"])
+    unit = unit_name(document["error_unit"])
     where = "" if document["quantity"] == "strain" else f", {document['quantity']}"
     console.print(
         f"{document['campaign']}{where}: {document['action']} {effect.name}, strength "

@@ -175,9 +175,11 @@ def _write(
 
 
 def _say(document: dict[str, Any], lines: Sequence[tuple[str, str]]) -> None:
+    from tirelib.report.page import unit_name
+
     console = output()
     named = document["named"]
-    unit = {"ustrain": "microstrain"}.get(document["error_unit"], document["error_unit"])
+    unit = unit_name(document["error_unit"])
     fall = f" -> {document['error_after']:.3g}" if named else ""
     console.print(
         f"{document['campaign']}, {document['quantity']}: {document['verdict']}"

@@ -35,31 +35,11 @@ METHOD_TEXT = (
 )
 
 
-def answer_of(told: Assessment) -> str:
-    """Return the verdict in plain words."""
-    names = ", ".join(told.named)
-    fall = (
-        f"the error falls from {number(told.before.value, 3)} to {number(told.after.value, 3)} "
-        f"(floor {number(told.floor, 3)})"
-    )
-    return {
-        "none": f"No effect stands out: the error {number(told.before.value, 3)} (floor "
-        f"{number(told.floor, 3)}) gives no reason to name one.",
-        "named": f"Missing: {names}. With it {fall}.",
-        "form_inadequate": f"{names} acts here, but its law has the wrong form: {fall}, and more "
-        "is left than plain tires show.",
-        "indistinguishable": f"One of {names} is missing; this campaign cannot distinguish them. "
-        f"With {told.named[0] if told.named else 'it'} {fall}.",
-        "unknown": "Something is missing that no effect of the catalogue explains; error "
-        f"{number(told.before.value, 3)} (floor {number(told.floor, 3)}).",
-    }[told.verdict]
-
-
 def write_diagnosis(
     told: Assessment,
     folder: Path,
-    history: Sequence[Mapping[str, Any]] = (),
-    lines: Sequence[tuple[str, str]] = (),
+    history: Sequence[Mapping[str, Any]],
+    lines: Sequence[tuple[str, str]],
 ) -> tuple[Path, Path]:
     """Write ``diagnosis.html`` and ``diagnosis.md``; return their paths.
 
@@ -83,7 +63,6 @@ def write_diagnosis(
         parts_of(told, history),
         title=TITLE,
         summary=_summary(told),
-        answer=answer_of(told),
         messages=told.messages,
         lines=lines,
     )

@@ -46,7 +46,6 @@ def write_extension(told: Mapping[str, Any], folder: Path) -> tuple[Path, Path]:
         [part for part in parts if part.tables or part.plots],
         title=f"{done}: {told['effect']}",
         summary=f"Campaign {told['campaign']}, {told['quantity']}.",
-        answer="",
         messages=told["messages"],
         lines=(
             (

@@ -31,8 +31,6 @@ def write_fleet(
         parts,
         title="Fleet",
         summary=f"{_count(document)}. Data set: {url}",
-        answer="",
-        messages=(),
         lines=_lines(document),
     )
 

@@ -62,7 +62,6 @@ def write_journey(journey: Journey, folder: Path) -> tuple[Path, Path]:
         parts_of(journey),
         title=TITLE,
         summary=_summary(told),
-        answer="",
         messages=told["messages"],
         lines=titled(told["explanation"]),
         links=links,

@@ -57,8 +57,8 @@ def write_parts_page(
     *,
     title: str,
     summary: str,
-    answer: str,
-    messages: Sequence[str],
+    messages: Sequence[str] = (),
+    answer: str = "",
     words: str | None = None,
     sentences: Sequence[str] = (),
     sentence_note: str = "",
@@ -70,6 +70,10 @@ def write_parts_page(
 
     Parameters
     ----------
+    messages : sequence of str
+        What a reader has to know of the data.
+    answer : str
+        The result as a sentence.
     words : str, optional
         Name of the Markdown file; by default that of the page.
     sentences : sequence of str

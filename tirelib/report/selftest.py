@@ -8,6 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from tirelib.report.figures.compare_plot import Plot, styled_figure
+from tirelib.report.findings import dead_effects
 from tirelib.report.page import DASH, Table, number
 from tirelib.report.parts_page import Part, write_parts_page
 
@@ -61,8 +62,6 @@ def _answer(document: Mapping[str, Any]) -> str:
 
 def parts_of(document: Mapping[str, Any]) -> list[Part]:
     """Return the parts of the page."""
-    dead = [[name, why] for name, why in document["dead"].items()]
-    tables = [Table("Dead effects", ["effect", "why"], dead, texts=2)] if dead else []
     return [
         Part(
             "Chance of finding",
@@ -72,7 +71,7 @@ def parts_of(document: Mapping[str, Any]) -> list[Part]:
             plots=[_map(document)] if document["effects"] else [],
         ),
         Part("Effects", "effects", tables=[_effects(document)]),
-        Part("Effects that this plan cannot show", "blind", tables=tables),
+        Part("Effects that this plan cannot show", "blind", tables=dead_effects(document["dead"])),
     ]
 
 
