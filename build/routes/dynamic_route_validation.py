@@ -9,13 +9,15 @@ from tirelib.arrays import FloatArray
 from tirelib.contact import radial
 from tirelib.contact.exact import load_exact
 from tirelib.errors import ParameterError
-from tirelib.identify.campaign_data import SAME_SERIES, StraightRuns
+from tirelib.identify.campaign_data import StraightRuns
 from tirelib.model.state import Operating, State
 from tirelib.ring.compliance import compliance
 from tirelib.ring.frequencies import rim_stiffness
 from tirelib.waveforms import GRID
 
 N_MODES = 60
+SAME_SERIES = 0.06
+"""Relative distance of pressures and speeds within which runs form one load series."""
 
 
 @dataclass(frozen=True, slots=True)

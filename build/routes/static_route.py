@@ -25,13 +25,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from routes.dynamic_route_validation import SAME_SERIES
 from routes.edges import Edges, corrected, edge_bias, read_edges
 from routes.static_route_fit import FewFit, Quantity
 from routes.static_route_problem import Conventional, StrainProblem
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact.static import StaticContact
 from tirelib.errors import CalibrationError, ConvergenceError, ParameterError
-from tirelib.identify.campaign_data import SAME_SERIES, StraightRuns
+from tirelib.identify.campaign_data import StraightRuns
 from tirelib.model.base import operating_points, values_of
 from tirelib.parameters import TireFile
 

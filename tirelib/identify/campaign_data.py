@@ -23,7 +23,6 @@ from tirelib.waveforms import GRID, Waveforms
 
 __all__ = [
     "LEAST_RUNS",
-    "SAME_SERIES",
     "StraightRuns",
     "straight_noise",
     "straight_runs",
@@ -34,8 +33,6 @@ __all__ = [
 TYPICAL_TOLERANCE = Tolerance(0.005, 0.002, 0.001, 0.003)
 """Of set points, where a campaign does not say its own."""
 
-SAME_SERIES = 0.06
-"""Relative distance of pressures and speeds within which runs form one load series."""
 STRUCTURE = 0.016
 """White part of the structural misfit, relative to the rms strain."""
 MIDDLE = 0.05
