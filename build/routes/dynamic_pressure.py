@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from routes.dynamic_route_damping import SHEAR_SHARE, Law, damped_compliance
+from routes.damped_ring import SHEAR_SHARE, Law, damped_compliance
 from tirelib.arrays import FloatArray
 from tirelib.contact import radial, shear
 from tirelib.contact.shear_law import Shear

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from routes.dynamic_route_damping import Law, damped_waveform
+from routes.damped_ring import Law, damped_waveform
 
 from tirelib.arrays import FloatArray
 from tirelib.campaign import CampaignHeader, Tolerance

@@ -4,13 +4,10 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from routes.damped_ring import damped_compliance, damped_waveform
 from routes.dynamic_pressure import dynamic_pressure
 from routes.dynamic_route import dynamic_route
-from routes.dynamic_route_damping import (
-    damped_compliance,
-    damped_waveform,
-    fit_damping,
-)
+from routes.dynamic_route_damping import fit_damping
 from routes.dynamic_route_problem import DynamicOptions, pressure_levels
 from routes.dynamic_route_validation import rim_checks, vertical_stiffness
 
