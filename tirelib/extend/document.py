@@ -68,15 +68,19 @@ def run_errors(done: Extension) -> list[dict[str, Any]]:
     return out
 
 
-def waterfall(file: TireFile, quantity: str) -> list[dict[str, Any]]:
-    """Return the fall of the error over a model's history, in the unit of its last step."""
-    told = [e for e in file.extra["history"] if e.get("quantity", "strain") == quantity]
-    names = [key for key in told[-1] if key.startswith("error_after")]
-    suffix = names[0].removeprefix("error_after") if names else ""
+def waterfall(history: Sequence[Mapping[str, Any]], quantity: str) -> list[dict[str, Any]]:
+    """Return the fall of the error over a model's history, in the unit of its last step.
+
+    Entries without a quantity are of strain, errors without a unit in their name in noise. Nothing
+    is returned if the last entry of the quantity tells no error.
+    """
+    told = [e for e in history if e.get("quantity", "strain") == quantity]
+    names = [key for key in told[-1] if key.startswith("error_after")] if told else []
+    if not names:
+        return []
+    suffix = names[0].removeprefix("error_after")
     unit = suffix.removeprefix("_") or "noise"
     told = [entry for entry in told if f"error_after{suffix}" in entry]
-    if not told:
-        return []
 
     def row(action: str, effect: str | None, entry: Mapping[str, Any], when: str) -> dict[str, Any]:
         return {
@@ -88,7 +92,7 @@ def waterfall(file: TireFile, quantity: str) -> list[dict[str, Any]]:
         }
 
     first = row("start", None, told[0], "before")
-    return [first, *(row(e["action"], e["effect"], e, "after") for e in told)]
+    return [first, *(row(e.get("action", "add"), e.get("effect", "?"), e, "after") for e in told)]
 
 
 def step_document(
@@ -111,7 +115,7 @@ def step_document(
         "in_range": "out_of_range" not in done.flags,
         "flags": list(done.flags),
         **head,
-        "waterfall": waterfall(file, str(head["quantity"])),
+        "waterfall": waterfall(file.extra["history"], str(head["quantity"])),
         "held_out": list(held_out),
         "effects": list(file.extra["effects"]),
         "history": [

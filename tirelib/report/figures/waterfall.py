@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import plotly.graph_objects as go
 
+from tirelib.extend.document import waterfall as fall_of
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import unit_name
 from tirelib.report.style import BLUE, FAINT, RED
@@ -77,44 +78,24 @@ def waterfall(
 
 
 def waterfall_of(history: Sequence[Mapping[str, Any]], quantity: str) -> Plot | None:
-    """Return the fall across a model's history for one quantity, or None without entries.
-
-    Entries without a quantity are of strain. Of entries in several units only those in the last
-    one's are shown.
-    """
-    entries = [e for e in history if e.get("quantity", "strain") == quantity]
-    unit = _unit_of(entries[-1]) if entries else None
-    if unit is None:
+    """Return the fall across a model's history for one quantity, or None without entries."""
+    rows = fall_of(history, quantity)
+    if not rows:
         return None
-    suffix = "" if unit == "noise" else f"_{unit}"
-    entries = [e for e in entries if _unit_of(e) == unit]
-
-    def value(entry: Mapping[str, Any], key: str) -> float:
-        return float(entry.get(f"{key}{suffix}", np.nan))
-
-    first = Step(
-        "before", value(entries[0], "error_before"), value(entries[0], "heldout_error_before")
-    )
+    unit = rows[0]["unit"]
+    last = [e for e in history if e.get("quantity", "strain") == quantity][-1]
+    floor = last.get("floor" if unit == "noise" else f"floor_{unit}")
     steps = [
-        Step(
-            f"{'-' if e.get('action') == 'remove' else ''}{e.get('effect', '?')}",
-            value(e, "error_after"),
-            value(e, "heldout_error_after"),
-        )
-        for e in entries
+        Step(_label(row["action"], row["effect"]), _size(row["error"]), _size(row["heldout_error"]))
+        for row in rows
     ]
-    return waterfall(
-        [first, *steps],
-        unit_name(unit),
-        value(entries[-1], "floor"),
-        f"history-{quantity}",
-        f"The model's history, {quantity}",
-    )
+    name, title = f"history-{quantity}", f"The model's history, {quantity}"
+    return waterfall(steps, unit_name(unit), _size(floor), name, title)
 
 
-def _unit_of(entry: Mapping[str, Any]) -> str | None:
-    """Return the unit of an entry's errors by the name under which they stand."""
-    for key in entry:
-        if key.startswith("error_after"):
-            return key.removeprefix("error_after").removeprefix("_") or "noise"
-    return None
+def _label(action: str, effect: str | None) -> str:
+    return "before" if effect is None else f"{'-' if action == 'remove' else ''}{effect}"
+
+
+def _size(value: float | None) -> float:
+    return float("nan") if value is None else float(value)
