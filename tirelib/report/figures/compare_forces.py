@@ -3,7 +3,6 @@
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
-from scipy import special
 
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.compare.force_curves import Curve, ranked, slip_of
@@ -16,6 +15,7 @@ from tirelib.report.figures.compare_plot import (
     Plot,
     confidence,
     heat,
+    level_means,
     limit_of,
     noise_band,
     stack_titles,
@@ -29,6 +29,8 @@ _OVER = tuple(
     (name, QUANTITIES[name].label, float(QUANTITIES[name].told(1.0)))
     for name in ("slip_angle", "slip_ratio", "camber", "load", "pressure")
 )
+
+_LISTED = ("load", "pressure", "slip_angle", "camber", "slip_ratio")
 
 
 def force_plots(found: ForceComparison) -> list[Plot]:
@@ -148,17 +150,11 @@ def force_trends(found: ForceComparison) -> list[Plot]:
 def _trend(found: ForceComparison, name: str, label: str, scale: float) -> Plot:
     unit = UNITS[found.quantity]
     x, column = _binned(getattr(found.data, name), name)
-    centre, half, count = np.full((3, x.size), np.nan)
     own = name == slip_of(found.quantity)
     size = np.abs(found.predicted) - np.abs(found.measured)
     difference = found.difference if own else size
     what = f"model less measured {found.quantity}" if own else f"size of {found.quantity} too large"
-    for k in range(x.size):
-        part = difference[column == k]
-        centre[k], count[k] = part.mean(), part.size
-        if part.size > 1:
-            error = part.std(ddof=1) / np.sqrt(part.size)
-            half[k] = error * special.stdtrit(part.size - 1, 0.975)
+    centre, half, count = level_means(difference, column, x.size)
     x = scale * x
     figure = go.Figure()
     confidence(figure, x, centre, half, "points")
@@ -223,21 +219,11 @@ def _over_slip(found: ForceComparison) -> Plot:
 
 
 def _rows(found: ForceComparison) -> tuple[list[str], list[list[float]]]:
-    d, unit = found.data, UNITS[found.quantity]
-    table = np.stack(
-        [
-            d.load,
-            d.pressure / 1e5,
-            np.rad2deg(d.slip_angle),
-            np.rad2deg(d.camber),
-            d.slip_ratio,
-            found.measured,
-            found.predicted,
-            found.difference,
-        ],
-        axis=1,
-    )
-    names = ["load [N]", "pressure [bar]", "slip angle [deg]", "camber [deg]", "slip ratio [-]"]
+    unit = UNITS[found.quantity]
+    said = [QUANTITIES[name] for name in _LISTED]
+    told = [QUANTITIES[name].told(getattr(found.data, name)) for name in _LISTED]
+    table = np.stack([*told, found.measured, found.predicted, found.difference], axis=1)
+    names = [f"{each.title} [{each.words or '-'}]" for each in said]
     names += [f"{what} [{unit}]" for what in ("measured", "model", "model less measured")]
     return names, np.round(table, 5).tolist()
 

@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
+from scipy.special import stdtrit
 
-from tirelib.arrays import FloatArray
+from tirelib.arrays import FloatArray, IntArray
 from tirelib.report.style import BLUE, FAINT, INK, RULE
 
 DIVERGING = [
@@ -122,6 +123,35 @@ def heat(z: npt.ArrayLike, x: npt.ArrayLike, limit: float, unit: str, **hover: A
     )
 
 
+def level_means(
+    values: FloatArray, level: IntArray, count: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return mean, half of the 95 % confidence interval and number of the values of each level.
+
+    Parameters
+    ----------
+    values : shape (n,)
+        NaN does not count.
+    level : shape (n,)
+        From 0 to count - 1; others belong to none.
+
+    Returns
+    -------
+    centre, half, number : shape (count,)
+        NaN where there are no values; the half as well where there is one.
+    """
+    centre, half, number = np.full((3, count), np.nan)
+    for k in range(count):
+        part = values[(level == k) & np.isfinite(values)]
+        number[k] = part.size
+        if part.size:
+            centre[k] = part.mean()
+        if part.size > 1:
+            error = part.std(ddof=1) / np.sqrt(part.size)
+            half[k] = error * stdtrit(part.size - 1, 0.975)
+    return centre, half, number
+
+
 def confidence(
     figure: go.Figure, x: FloatArray, centre: FloatArray, half: FloatArray, of: str, **place: Any
 ) -> None:
@@ -152,7 +182,7 @@ def confidence(
         )
     figure.add_scatter(
         x=x,
-        y=np.round(centre, 2),
+        y=np.round(centre, 4),
         mode="lines+markers",
         line={"color": BLUE},
         name=f"mean over the {of}",

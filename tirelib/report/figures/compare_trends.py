@@ -3,7 +3,6 @@
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
-from scipy import special
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.compare.document import edge_value
@@ -15,7 +14,7 @@ from tirelib.compare.strain import Comparison
 from tirelib.compare.tracks import Track
 from tirelib.quantities import QUANTITIES
 from tirelib.report.figures.compare_heat import NAMES as CONDITIONS
-from tirelib.report.figures.compare_plot import Plot, confidence, styled_figure
+from tirelib.report.figures.compare_plot import Plot, confidence, level_means, styled_figure
 from tirelib.report.style import BLACK, BLUE, CATEGORIES, FAINT, RED
 
 _HOW = {
@@ -64,7 +63,7 @@ def _trend(found: Comparison, factor: Factor) -> Plot:
     )
     rows: list[list[object]] = []
     for number, name in enumerate(SECTORS):
-        centre, half = _bands(means[:, number], factor)
+        centre, half, _ = level_means(means[:, number], factor.level, factor.values.size)
         where = {"row": number // 3 + 1, "col": number % 3 + 1}
         confidence(figure, x, centre, half, "runs", showlegend=number == 0, **where)
         rows += [
@@ -90,19 +89,6 @@ def _trend(found: Comparison, factor: Factor) -> Plot:
         ["sector", label, "model less measured [microstrain]", "95 % half-width [microstrain]"],
         rows,
     )
-
-
-def _bands(values: FloatArray, factor: Factor) -> tuple[FloatArray, FloatArray]:
-    centre, half = [], []
-    for k in range(factor.values.size):
-        part = values[(factor.level == k) & np.isfinite(values)]
-        centre.append(float(part.mean()) if part.size else np.nan)
-        wide = np.nan
-        if part.size > 1:
-            error = part.std(ddof=1) / np.sqrt(part.size)
-            wide = float(error * special.stdtrit(part.size - 1, 0.975))
-        half.append(wide)
-    return np.array(centre), np.array(half)
 
 
 def track_plots(found: Comparison) -> list[Plot]:
