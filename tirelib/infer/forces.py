@@ -212,7 +212,10 @@ class ForceProblem:
         return groups
 
     def roughly(
-        self, effects: Sequence[Effect], done: Sequence[FloatArray]
+        self,
+        effects: Sequence[Effect],
+        rows: Sequence[FloatArray],
+        ranges: Sequence[FloatArray],
     ) -> Sequence[FloatArray]:
         """Return how the laws of effects may be off: smoothly over pairs of conditions.
 
@@ -222,20 +225,18 @@ class ForceProblem:
         has done most of what its condition does.
         """
         factors = self._factors()
-        whole = float(np.sqrt(sum(np.mean(rows**2) for rows in done)))
+        done = [size @ each for size, each in zip(ranges, rows, strict=True)]
+        whole = float(np.sqrt(sum(np.mean(each**2) for each in done)))
         slips, out = self._shapes() * self.size, []
-        for effect, rows in zip(effects, done, strict=True):
+        for effect, each in zip(effects, done, strict=True):
             one = np.ones_like(self.size)
             own = [factors[name] for name in effect.varies_with if name in factors] or [one]
             pairs = [f * g for f in own for g in (one, *factors.values())]
             parts = [slips * pair for pair in pairs]
-            sizes = [np.sqrt(np.mean(np.sum(part**2, axis=0))) for part in parts]
-            otherwise = [rows * (f - float(np.mean(f))) for f in factors.values()]
-            out.append(
-                np.concatenate(
-                    [*(whole / s * p for p, s in zip(parts, sizes, strict=True)), *otherwise]
-                )
-            )
+            sizes = [np.sqrt(len(pairs) * np.mean(np.sum(part**2, axis=0))) for part in parts]
+            smooth = [whole / size * part for part, size in zip(parts, sizes, strict=True)]
+            otherwise = [each * (f - float(np.mean(f))) for f in factors.values()]
+            out.append(np.concatenate([*smooth, np.array(otherwise)]))
         return out
 
     def _shapes(self) -> FloatArray:

@@ -287,13 +287,13 @@ def explaining(
         every[effect.name] = slopes[first : first + effect.components]
         first += effect.components
     every |= problem.remainder(point, solved)
-    first, done = len(point.base), []
-    for effect, strength in zip(own, point.strengths, strict=False):
-        size = float(np.linalg.norm(strength)) / effect.scale
-        done.append(size * slopes[first : first + effect.components])
+    first, rows = len(point.base), []
+    for effect in own:
+        rows.append(slopes[first : first + effect.components])
         first += effect.components
-    for effect, rows in zip(own, problem.roughly(own, done), strict=True):
-        every[ROUGHLY + effect.name] = rows
+    ranges = [s / e.scale for e, s in zip(own, point.strengths, strict=False)]
+    for effect, errors in zip(own, problem.roughly(own, rows, ranges), strict=True):
+        every[ROUGHLY + effect.name] = errors
     return every, slopes
 
 

@@ -95,10 +95,13 @@ class Problem(Protocol):
         """Return groups of smooth shapes that no law describes, rows (k, ...) each."""
 
     def roughly(
-        self, effects: Sequence[Effect], done: Sequence[FloatArray]
+        self,
+        effects: Sequence[Effect],
+        rows: Sequence[FloatArray],
+        ranges: Sequence[FloatArray],
     ) -> Sequence[FloatArray]:
-        """Return for each effect how its law may be off, rows (k, ...).
+        """Return for each effect how its law may be off, rows (k, ...) as large as what it does.
 
-        `done` are each effect's rows at the size of its strength, (components, ...). The
-        rows are of errors as large as that.
+        `rows` are (components, ...) for a strength of one range, `ranges` the strengths,
+        (components,).
         """

@@ -198,9 +198,20 @@ def select(
     families: Sequence[Family],
     *,
     false_alarm: float = 0.05,
+    many: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Verdict:
-    """Return which effects, if any, a model lacks; arguments and errors are `Hypotheses`'."""
+    """Return which effects, if any, a model lacks.
+
+    Parameters
+    ----------
+    problem, families, false_alarm, progress
+        As of `Hypotheses`, whose errors are raised.
+    many : bool
+        Whether more effects than `MOST` may act at once. Where every hypothesis is rejected, even
+        with laws that are off by as much as themselves, the effect that stands out most is added
+        to the likeliest until one remains.
+    """
     hypotheses = Hypotheses(problem, families, false_alarm, progress)
     base, alpha = hypotheses.base, false_alarm
 
@@ -228,6 +239,12 @@ def select(
         if members:
             return done("named" if len(members) == 1 else "indistinguishable", members)
         leaders = fitted[: LEADERS if size == 1 else 1]
+    leader = leaders[0] if leaders else None
+    while many and leader is not None and not np.isfinite(leader.looseness):
+        further = _further(leader, hypotheses.effects, 1)
+        leader = hypotheses.at((*hypotheses.added(leader), *further), leader) if further else None
+        if leader is not None and not leader.plausible:
+            break
     free = [h for h in hypotheses.tried if h.plausible and np.isfinite(h.looseness)]
     if free:
         # the laws of what is there are off by less than those of what is not

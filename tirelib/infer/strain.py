@@ -425,10 +425,14 @@ class StrainProblem:
         return groups
 
     def roughly(
-        self, effects: Sequence[Effect], done: Sequence[FloatArray]
+        self,
+        effects: Sequence[Effect],
+        rows: Sequence[FloatArray],
+        ranges: Sequence[FloatArray],
     ) -> Sequence[FloatArray]:
         """Return how what effects do would look if their laws were roughly right."""
-        return [self._roughly(rows) for rows in done]
+        each = zip(rows, ranges, strict=True)
+        return [self._roughly(float(np.linalg.norm(size)) * own) for own, size in each]
 
     def _roughly(self, rows: FloatArray) -> FloatArray:
         """Return how rows would look if their law were roughly right.

@@ -88,8 +88,11 @@ class Toy:
     def remainder(self, point: Point, solved: Any) -> dict[str, FloatArray]:
         return {"smooth, all": self.shapes, "smooth, there": self.there}
 
-    def roughly(self, effects: Any, done: Sequence[FloatArray]) -> list[FloatArray]:
-        return [rows * np.sin(np.arange(N) / 10.0) for rows in done]
+    def roughly(
+        self, effects: Any, rows: Sequence[FloatArray], ranges: Sequence[FloatArray]
+    ) -> list[FloatArray]:
+        each = zip(rows, ranges, strict=True)
+        return [np.linalg.norm(size) * own * np.sin(np.arange(N) / 10.0) for own, size in each]
 
 
 def drawn(random: np.random.Generator, *, size: float = 1.0, **planted: float) -> FloatArray:

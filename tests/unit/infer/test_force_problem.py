@@ -127,13 +127,15 @@ def test_a_laws_error_is_as_large_as_what_all_effects_do_and_goes_with_pairs_of_
     at, size = made.bench.conditions, made.size
     effects = [CATALOGUE["friction_load"], CATALOGUE["friction_pressure"]]
     large, small = (0.1 * size * np.sign(made.slip))[None], (1e-6 * size)[None]
-    alone, both = made.roughly(effects[:1], [large]), made.roughly(effects, [large, small])
+    one = np.ones(1)
+    alone = made.roughly(effects[:1], [large], [one])
+    both = made.roughly(effects, [large, small], [one, one])
     np.testing.assert_allclose(both[0], alone[0], rtol=1e-6)
-    count = len(both[1])
     # the small one's law is off by as much as the large one's
     strength = [np.sqrt(np.mean(np.sum(rows**2, axis=0))) for rows in both]
     assert strength[1] == pytest.approx(strength[0], rel=0.5)
-    assert len(made.roughly(effects, [0.0 * large, 0.0 * small])[1]) == count
+    double = made.roughly(effects, [large, small], [2.0 * one, one])
+    np.testing.assert_allclose(double[0], 2.0 * both[0], rtol=1e-6)
     # friction over pressure that goes with the load, on one side of the slip
     pair = size * (at.pressure / np.median(at.pressure) - 1.0) * np.log(at.load / 4e3)
     pair = pair * (made.slip > 0.5)

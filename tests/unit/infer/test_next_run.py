@@ -60,8 +60,14 @@ class Ahead(Toy):
     def solve(self, point: Any, near: Any = None) -> Solved:
         return super().solve(point, near)
 
-    def roughly(self, effects: Any, done: Sequence[FloatArray]) -> list[FloatArray]:
-        return [rows * np.sin(np.arange(rows.shape[1]) / 10.0) for rows in done]
+    def roughly(
+        self, effects: Any, rows: Sequence[FloatArray], ranges: Sequence[FloatArray]
+    ) -> list[FloatArray]:
+        each = zip(rows, ranges, strict=True)
+        return [
+            np.linalg.norm(size) * own * np.sin(np.arange(own.shape[1]) / 10.0)
+            for own, size in each
+        ]
 
 
 @pytest.fixture(scope="module")

@@ -77,8 +77,9 @@ def force_folds(problem: Problem) -> tuple[ForceFold, ...]:
 def _usable(problem: Problem, fold: ForceFold) -> bool:
     """Whether enough is left out, and enough is left to fit."""
     out, n = int(fold.out.sum()), len(problem)
-    still = fold.name in ("time", "cell") or _still(problem, fold)
-    return out >= 3 and n - out >= LEAST_POINTS and still
+    if out < 3 or n - out < LEAST_POINTS:
+        return False
+    return fold.name in ("time", "cell") or _still(problem, fold)
 
 
 def _part(time: FloatArray, block: IntArray) -> IntArray:
