@@ -104,8 +104,6 @@ def diagnose(
     *,
     effects: "Mapping[str, Effect] | None" = None,
     false_alarm: float = 0.05,
-    members: int = 100,
-    seed: int = 0,
     progress: Progress | None = None,
 ) -> "Assessment | ForceAssessment":
     """Find the physical effect that a model lacks.
@@ -115,9 +113,7 @@ def diagnose(
     campaign, model, quantity, effects, progress
         As of `compare`.
     false_alarm : float
-        Probability with which a tire that lacks nothing is said to lack something (strain).
-    members, seed : int
-        Number and seed of the variants of the model that thresholds are taken from (forces).
+        Probability with which a tire that lacks nothing is said to lack something.
 
     Raises
     ------
@@ -130,7 +126,7 @@ def diagnose(
         from tirelib.diagnose.forces.assess import assess_forces, force_case
 
         case = force_case(campaign, model, catalogue, quantity)
-        return assess_forces(case, effects_of, members=members, seed=seed, progress=progress)
+        return assess_forces(case, effects_of, false_alarm=false_alarm, progress=progress)
     import numpy as np
 
     from tirelib.compare.model import model_of

@@ -13,22 +13,23 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from scipy.linalg import subspace_angles
 
 from next_test.pair import REFERENCE, Pair, PairCase, foretold, look_alikes, open_still
 from tests.magic_sweep import _force
 from tirelib.arrays import FloatArray
 from tirelib.compare.force_model import ForceModel
 from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.candidates import force_candidates
 from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force
 from tirelib.effects import CATALOGUE
 from tirelib.identify.brush_fit import fit_brush
 from tirelib.identify.brush_model import BrushModel
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.force_points import force_points
+from tirelib.infer.forces import ForceProblem
+from tirelib.infer.problem import Point
 from tirelib.planning.envelope import Envelope
 from tirelib.planning.force_rivals import (
-    MEMBERS,
     ForceTrial,
     force_axes,
     force_envelope,
@@ -204,7 +205,7 @@ def tire_of(test: PairCase) -> Tire:
     none = Tire(test.seed, float(at["time"].max()), test.truth, 0.0)
     case = case_of(none.measured(at, 0))
     base = fit_force(case.problem, case.model.values)
-    structure = structure_rows(case.problem, len(case.problem), base, MEMBERS, 0)
+    structure = structure_rows(case.problem, len(case.problem), base)
     white = try_force_suspects(case, base, (), structure).counted
     rows = white(np.concatenate([base.slopes, structure]))
     inner = np.linalg.inv(rows @ rows.T + np.eye(len(rows)))
@@ -227,8 +228,19 @@ def pairs(*, scattered: bool = False) -> list[Pair]:
         at = PLANS[plan].points(REFERENCE)
         case = case_of(Tire(REFERENCE, float(at["time"].max()), DRIFTS[0], 0.0).measured(at, 0))
         base = fit_force(case.problem, case.model.values)
-        found = force_candidates(case.problem, base, [CATALOGUE[name] for name in PLANTED])
-        return found.names, found.angles
+        wanted = [CATALOGUE[name] for name in PLANTED]
+        problem = ForceProblem(case.problem.bench, "Fy", base.values, wanted, noise=NOISE)
+        living, count = problem.living, len(problem.names)
+        zeros = tuple(np.zeros(effect.components) for effect in living)
+        point = Point(problem.start.base, living, zeros)
+        slopes = problem.slopes(point, problem.solve(point))
+        basis = np.linalg.qr(slopes[:count].T)[0]
+        ends = count + np.cumsum([effect.components for effect in living])[:-1]
+        own = [
+            (rows - (rows @ basis) @ basis.T).T for rows in np.split(slopes[count:], ends - count)
+        ]
+        angles = [[float(subspace_angles(a, b).min()) for b in own] for a in own]
+        return [effect.name for effect in living], np.array(angles)
 
     return look_alikes(SCATTERED if scattered else SWEEPS, signatures)
 
@@ -285,5 +297,5 @@ def _with_run(
 
 def _tried(case: ForceCase, base: ForceFit, suspects: Sequence[Any]) -> ForceTrial:
     """Return the rivals on a campaign."""
-    structure = structure_rows(case.problem, len(case.problem), base, MEMBERS, 0)
+    structure = structure_rows(case.problem, len(case.problem), base)
     return try_force_suspects(case, base, suspects, structure)

@@ -69,7 +69,7 @@ def strain(tmp_path_factory: pytest.TempPathFactory) -> Any:
             patch.setattr(
                 module, "measure_waveforms", lambda campaign, progress=None: campaign.measured
             )
-        return journey(folder / "out", "DIR", "--model", folder / "M.toml", "--members", 8)
+        return journey(folder / "out", "DIR", "--model", folder / "M.toml")
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def forces(tmp_path_factory: pytest.TempPathFactory) -> Any:
     folder = tmp_path_factory.mktemp("forces")
     campaign = write_sweep(folder / "sweep", 81, {"friction_load": 0.12})
     write_tire(brush_file(campaign), folder / "M.toml", "tirelib-model/1")
-    return journey(folder / "out", folder / "sweep", "--model", folder / "M.toml", "--members", 20)
+    return journey(folder / "out", folder / "sweep", "--model", folder / "M.toml")
 
 
 def test_what_was_planted_is_named_added_and_the_error_falls(strain: Any) -> None:

@@ -71,8 +71,6 @@ def told(place: Path) -> dict[str, Any]:
         place / "M.toml",
         "--quantity",
         "Fy",
-        "--members",
-        30,
         "--out",
         place / "D",
         "--json",
@@ -194,21 +192,14 @@ def test_adding_what_was_named_lets_the_held_out_error_fall_step_by_step(
 def test_the_next_test_of_forces_is_the_diagnosis_s_advice(
     place: Path, told: dict[str, Any]
 ) -> None:
-    plan = done(
-        "next-test",
-        place / "sweep",
-        "--model",
-        place / "M.toml",
-        "--quantity",
-        "Fy",
-        "--members",
-        30,
-        "--json",
-        place / "N.json",
-    )
+    words = ("next-test", place / "sweep", "--model", place / "M.toml", "--quantity", "Fy")
+    plan = done(*words, "--json", place / "N.json")
     assert plan["format"] == "tirelib-next-test/1"
     assert (plan["quantity"], plan["verdict"]) == ("Fy", told["verdict"])
-    # named effects whose twins are as good as ruled out are not in doubt
+    # one set of effects is left
+    assert plan["between"] == []
+    pair = ("--suspects", "friction_pressure,friction_drift")
+    plan = done(*words, *pair, "--json", place / "N.json")
     assert plan["between"] == ["friction_pressure", "friction_drift"]
     # the campaign is one of sweeps, and so is the advised run
     angles = plan["best"]["slip_angles_deg"]
@@ -267,8 +258,6 @@ def test_a_tire_whose_curve_is_no_brush_but_lacks_no_effect_is_given_no_name(
         tmp_path / "sweep",
         "--model",
         tmp_path / "M.toml",
-        "--members",
-        20,
         "--json",
         tmp_path / "D.json",
     )
@@ -278,7 +267,7 @@ def test_a_tire_whose_curve_is_no_brush_but_lacks_no_effect_is_given_no_name(
 
 
 def test_steady_runs_name_friction_over_load_and_cannot_know_relaxation(place: Path) -> None:
-    words = ("--model", place / "S.toml", "--members", 20, "--json", place / "S.json")
+    words = ("--model", place / "S.toml", "--json", place / "S.json")
     found = done("diagnose", place / "steady", *words)
     assert found["named"] == ["friction_load"]
     assert "relaxation" in found["dead"]
@@ -295,8 +284,6 @@ def test_without_repeats_there_are_hints_only(place: Path) -> None:
         place / "single",
         "--model",
         place / "S.toml",
-        "--members",
-        10,
         "--json",
         place / "N.json",
     )
@@ -312,8 +299,6 @@ def test_a_model_that_does_not_fit_at_all_gets_no_name(place: Path) -> None:
         place / "wrong",
         "--model",
         place / "S.toml",
-        "--members",
-        10,
         "--json",
         place / "W.json",
     )
@@ -392,8 +377,6 @@ def test_real_flat_belt_data_name_pressure_load_temperature_and_camber(
         tmp_path / "M.toml",
         "--quantity",
         "Fy",
-        "--members",
-        12,
         "--json",
         tmp_path / "D.json",
     )

@@ -37,12 +37,10 @@ def test_identify_diagnose_and_add_give_what_the_verbs_give(tmp_path: Path) -> N
         folder,
         "--model",
         tmp_path / "M.toml",
-        "--members",
-        8,
         "--json",
         tmp_path / "d.json",
     )
-    found = tirelib.diagnose(campaign, file, members=8)
+    found = tirelib.diagnose(campaign, file)
     assert list(found.named) == told["named"]
     assert found.floor == pytest.approx(told["floor"])
 

@@ -38,14 +38,14 @@ def several(times: int) -> StraightRuns:
 def test_the_cost_grows_no_faster_than_the_runs() -> None:
     small, large = several(2), several(6)
     values = values_of(TIRE)
-    few = cost(lambda: diagnose(small, values, EFFECTS, members=12))
-    many = cost(lambda: diagnose(large, values, EFFECTS, members=12))
+    few = cost(lambda: diagnose(small, values, EFFECTS))
+    many = cost(lambda: diagnose(large, values, EFFECTS))
     assert many < 1.5 * 3.0 * few
 
 
 def test_the_cost_grows_no_faster_than_the_effects() -> None:
     given, values = several(2), values_of(TIRE)
     living = [e for e in EFFECTS if not e.untestable and "lateral" not in e.varies_with]
-    few = cost(lambda: diagnose(given, values, living[:6], members=12))
-    many = cost(lambda: diagnose(given, values, living[:18], members=12))
+    few = cost(lambda: diagnose(given, values, living[:6]))
+    many = cost(lambda: diagnose(given, values, living[:18]))
     assert many < 1.5 * 3.0 * few

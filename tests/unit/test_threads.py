@@ -90,7 +90,7 @@ class Asked:
         (identify_forces, 1, ()),
         (compare, 2, ()),
         (diagnose, 3, ()),
-        (diagnose_force, 3, ("noise", "repeats")),
+        (diagnose_force, 3, ("noise",)),
         (add_effect, 3, ()),
         (add_brush_effect, 2, ()),
         (next_test, 3, ()),

@@ -21,11 +21,9 @@ from tirelib.cli.options import (
     effects_option,
     false_alarm_option,
     json_option,
-    members_option,
     model_option,
     quantity_option,
     report_option,
-    seed_option,
 )
 from tirelib.errors import TirelibError
 from tirelib.journey import explains_forces
@@ -44,9 +42,8 @@ Examples:
 
 \b
 Verdicts: none, named, form_inadequate (right effect, wrong law), indistinguishable (several would
-do), unknown (something that no effect of the catalogue explains). An effect is an alarm when its
-score is 3.5 times the largest that variants of the model without any effect have; a hint from
-once on.
+do), unknown (something that no effect of the catalogue explains). An effect is an alarm if it is
+named, and a hint if it may stand in the place of one that is.
 Exit code: 0 whatever the verdict, 2 bad input.
 """
 SHOWN = 8
@@ -58,8 +55,6 @@ SHOWN = 8
 @quantity_option
 @effects_option
 @false_alarm_option
-@members_option
-@seed_option
 @report_option("diagnosis")
 @json_option()
 def diagnose(
@@ -68,8 +63,6 @@ def diagnose(
     quantity: str | None,
     effect_files: tuple[Path, ...],
     false_alarm: float,
-    members: int,
-    seed: int,
     out: Path | None,
     json_file: Path | None,
 ) -> None:
@@ -84,7 +77,7 @@ def diagnose(
     forces = explains_forces(quantity, campaign, file)
     with progress_bar("diagnosing") as progress:
         if forces:
-            told, document = of_forces(campaign, file, catalogue, quantity, members, seed, progress)
+            told, document = of_forces(campaign, file, catalogue, quantity, false_alarm, progress)
         else:
             told, document = _of_strain(campaign, file, catalogue, false_alarm, progress)
     explanation = explained(document, model_name, str(folder))
@@ -143,8 +136,7 @@ def of_forces(
     file: "TireFile",
     catalogue: Mapping[str, "Effect"],
     quantity: str | None,
-    members: int,
-    seed: int,
+    false_alarm: float,
     progress: Callable[[str], None],
 ) -> tuple[Any, dict[str, Any]]:
     """Return a diagnosis of forces, and its document."""
@@ -152,9 +144,7 @@ def of_forces(
     from tirelib.diagnose.forces.document import force_diagnosis_document
 
     case = force_case(campaign, file, catalogue, quantity)
-    told = assess_forces(
-        case, list(catalogue.values()), members=members, seed=seed, progress=progress
-    )
+    told = assess_forces(case, list(catalogue.values()), false_alarm=false_alarm, progress=progress)
     return told, force_diagnosis_document(told)
 
 

@@ -17,7 +17,7 @@ from tirelib.cli.common import (
     output,
     write_json,
 )
-from tirelib.cli.options import effects_option, json_option, members_option, quantity_option
+from tirelib.cli.options import effects_option, json_option, quantity_option
 from tirelib.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.journey import QUANTITIES, explains_forces
 
@@ -55,7 +55,6 @@ be run one by one. Exit code: 0 whatever the verdict, 2 bad input or no model co
 )
 @quantity_option
 @effects_option
-@members_option
 @click.option(
     "--out",
     "out",
@@ -70,7 +69,6 @@ def explain(
     model_name: str | None,
     quantity: str | None,
     effect_files: tuple[Path, ...],
-    members: int,
     out: Path,
     json_file: Path | None,
 ) -> None:
@@ -84,7 +82,7 @@ def explain(
         )
     read_campaign(folder)  # what is wrong with it is said before anything is written
     out.mkdir(parents=True, exist_ok=True)
-    steps = Steps(folder, out, tuple(str(path) for path in effect_files), members)
+    steps = Steps(folder, out, tuple(str(path) for path in effect_files))
     journey = steps.walk(model_name, quantity)
     document = journey.document
     console = output()
@@ -111,14 +109,10 @@ class Steps:
     out : Path
         Where models and pages go.
     effect_files : tuple of str
-    members : int
-        Of the diagnosis.
     """
 
-    def __init__(
-        self, folder: Path, out: Path, effect_files: tuple[str, ...], members: int
-    ) -> None:
-        self.folder, self.out, self.members = folder, out, members
+    def __init__(self, folder: Path, out: Path, effect_files: tuple[str, ...]) -> None:
+        self.folder, self.out = folder, out
         self.effects = [word for path in effect_files for word in ("--effects", path)]
         self.commands: list[str] = []
         self.messages: list[str] = []
@@ -143,8 +137,6 @@ class Steps:
             model,
             *about,
             *self.effects,
-            "--members",
-            str(self.members),
             "--out",
             str(self.out / "diagnosed"),
             json_name="diagnosis",

@@ -23,11 +23,9 @@ from tirelib.cli.options import (
     effects_option,
     false_alarm_option,
     json_option,
-    members_option,
     model_option,
     quantity_option,
     report_option,
-    seed_option,
 )
 from tirelib.errors import FormatError, ParameterError
 from tirelib.journey import explains_forces
@@ -115,8 +113,6 @@ DIAGNOSIS = "tirelib-diagnosis/1"
 )
 @effects_option
 @false_alarm_option
-@members_option
-@seed_option
 @report_option("next_test")
 @json_option()
 def next_test(
@@ -129,8 +125,6 @@ def next_test(
     wanted: float,
     effect_files: tuple[Path, ...],
     false_alarm: float,
-    members: int,
-    seed: int,
     out: Path | None,
     json_file: Path | None,
     **ranges: tuple[float, float] | None,
@@ -165,8 +159,7 @@ def next_test(
             diagnosis_file,
             names,
             declared,
-            members,
-            seed,
+            false_alarm,
             wanted,
             sweep,
         )
@@ -237,8 +230,7 @@ def _for_force(
     diagnosis_file: Path | None,
     names: str | None,
     declared: dict[str, Any],
-    members: int,
-    seed: int,
+    false_alarm: float,
     wanted: float,
     sweep: bool | None,
 ) -> tuple[dict[str, Any], "Plan"]:
@@ -254,7 +246,7 @@ def _for_force(
             told = _read_diagnosis(diagnosis_file, quantity)
             quantity = str(told["quantity"])
         elif names is None:
-            _, told = of_forces(campaign, file, catalogue, quantity, members, seed, progress)
+            _, told = of_forces(campaign, file, catalogue, quantity, false_alarm, progress)
             quantity = told["quantity"]
         case = force_case(campaign, file, catalogue, quantity)
         has = [effect.name for effect in case.effects]

@@ -65,15 +65,6 @@ false_alarm_option = click.option(
     help="Probability with which a tire that lacks nothing is said to lack something.",
 )
 
-members_option = click.option(
-    "--members",
-    metavar="N",
-    type=click.IntRange(min=4),
-    default=100,
-    show_default=True,
-    help="Number of variants of the model from which the thresholds follow.",
-)
-"""Size of the ensemble of plain tires that a verdict is judged by."""
 
 seed_option = click.option(
     "--seed",

@@ -16,6 +16,7 @@ from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.span import span
 from tirelib.infer.hypothesis import Hypothesis, p_value
 from tirelib.infer.plain import BASE, ROUGHLY, Family, load
+from tirelib.infer.problem import Problem
 from tirelib.infer.select import Verdict, select
 from tirelib.infer.strain import StrainProblem
 from tirelib.threads import one_thread
@@ -167,7 +168,7 @@ def diagnose(
     return Diagnosis(
         verdict,
         tuple(dict.fromkeys(name for names in verdict.sets for name in names)),
-        _findings(verdict, problem, base),
+        findings_of(verdict, problem, base.reached.rest, base.reached.white_of),
         problem.dead,
         base,
         final,
@@ -184,8 +185,24 @@ def _unexplained(best: Hypothesis) -> FloatArray:
     return best.fit.rest - np.tensordot(best.null.explained(), rows, axes=1)
 
 
-def _findings(verdict: Verdict, problem: StrainProblem, base: Fitted) -> tuple[Finding, ...]:
-    """Return every effect that the plan may show, by rank."""
+def findings_of(
+    verdict: Verdict,
+    problem: Problem,
+    rest: FloatArray,
+    white_of: Callable[[FloatArray], FloatArray],
+) -> tuple[Finding, ...]:
+    """Return every effect that the plan may show, by rank.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    problem : Problem
+        Of the verdict's hypotheses.
+    rest : shape (...)
+        What the model without further effects leaves, measured less model.
+    white_of : callable
+        Brings rows (k, ...) to the unit of errors.
+    """
     first, null = verdict.base, verdict.base.null
     limit = first.limit(verdict.alpha)
     living = {effect.name: effect for effect in problem.living if effect.name in null.names}
@@ -198,10 +215,9 @@ def _findings(verdict: Verdict, problem: StrainProblem, base: Fitted) -> tuple[F
         if not verdict.sets
         else dict(zip(verdict.best.names, range(len(verdict.best.names)), strict=True))
     )
-    white_of = base.reached.white_of
     own = span(white_of(first.fit.rows[BASE]).reshape(len(first.fit.rows[BASE]), -1).T)
-    rest = white_of(base.reached.rest).ravel()
-    rest = rest - own @ (own.T @ rest)
+    left_over = white_of(rest).ravel()
+    left_over = left_over - own @ (own.T @ left_over)
     rows = []
     for name, effect in living.items():
         alone = tried.get(name)
@@ -230,7 +246,7 @@ def _findings(verdict: Verdict, problem: StrainProblem, base: Fitted) -> tuple[F
                         (strength >= effect.low - 2.0 * std) & (strength <= effect.high + 2.0 * std)
                     ).all()
                 ),
-                _share(white_of(first.fit.rows[name]), own, rest),
+                _share(white_of(first.fit.rows[name]), own, left_over),
                 twins_of(name, first),
                 null.power(name, 1.0 / 3.0, limit),
             )

@@ -5,19 +5,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tirelib.diagnose.diagnose import FALSE_ALARM
 from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.candidates import ForceCandidates, force_candidates
-from tirelib.diagnose.forces.ensemble import force_ensemble
+from tirelib.diagnose.forces.diagnose import plain_tires
 from tirelib.diagnose.forces.fit import ForceFit, fit_force, with_effect
 from tirelib.diagnose.forces.floor import force_floor
 from tirelib.diagnose.forces.held_out import ForceFold, errors_of, force_folds
-from tirelib.diagnose.forces.ranking import ForceRanking
-from tirelib.effects import Effect
+from tirelib.effects import CATALOGUE, Effect
 from tirelib.errors import ParameterError, TirelibError
 from tirelib.extend.step import Step, added, removed
+from tirelib.infer.forces import ForceProblem
+from tirelib.infer.select import Hypotheses
 from tirelib.threads import one_thread
-
-FLOOR_MEMBERS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +37,6 @@ def add_brush_effect(
     effect: Effect,
     *,
     progress: Callable[[str], None] | None = None,
-    members: int = FLOOR_MEMBERS,
 ) -> ForceExtension:
     """Return a brush with one effect more; parameters and all strengths are fitted anew.
 
@@ -48,8 +46,6 @@ def add_brush_effect(
     effect : Effect
         Of stage brush.
     progress : callable, optional
-    members : int
-        Variants from which the floor is.
 
     Raises
     ------
@@ -60,7 +56,7 @@ def add_brush_effect(
     ConvergenceError
         If a fit does not settle.
     """
-    return ForceExtension(**vars(added(_Force(case, progress, members), effect)), case=case)
+    return ForceExtension(**vars(added(_Force(case, progress), effect)), case=case)
 
 
 def remove_brush_effect(
@@ -68,13 +64,12 @@ def remove_brush_effect(
     effect: Effect,
     *,
     progress: Callable[[str], None] | None = None,
-    members: int = FLOOR_MEMBERS,
 ) -> ForceExtension:
     """Return a brush without one of its effects; the rest is fitted anew.
 
     Parameters and errors as for `add_brush_effect`.
     """
-    return ForceExtension(**vars(removed(_Force(case, progress, members), effect)), case=case)
+    return ForceExtension(**vars(removed(_Force(case, progress), effect)), case=case)
 
 
 def case_for(cases: Sequence[ForceCase], effect: Effect) -> ForceCase:
@@ -96,7 +91,7 @@ def case_for(cases: Sequence[ForceCase], effect: Effect) -> ForceCase:
     for case in cases:
         if effect.name in {each.name for each in case.effects}:
             return case
-        subject = _Force(case, None, 0)
+        subject = _Force(case, None)
         subject.refuse(effect)
         try:
             before = subject.fitted()
@@ -115,10 +110,8 @@ class _Force:
 
     acts_on = "the brush"
 
-    def __init__(
-        self, case: ForceCase, progress: Callable[[str], None] | None, members: int
-    ) -> None:
-        self.case, self.progress, self.members = case, progress, members
+    def __init__(self, case: ForceCase, progress: Callable[[str], None] | None) -> None:
+        self.case, self.progress = case, progress
         self.name = case.model.name
 
     @property
@@ -141,7 +134,7 @@ class _Force:
 
     def dead(self, before: ForceFit, effect: Effect) -> str:
         """Return why the points cannot show an effect, or an empty text."""
-        return force_candidates(self.case.problem, before, [effect]).dead.get(effect.name, "")
+        return self._problem(before, [effect]).dead.get(effect.name, "")
 
     def with_effect(self, before: ForceFit, effect: Effect) -> ForceFit:
         """Return the fit with one effect more."""
@@ -167,17 +160,22 @@ class _Force:
         return errors_of(self.case.problem, fit, folds)
 
     def floor(self, after: ForceFit) -> float:
-        """Return the part of the error that noise and structure explain, as errors are told."""
-        case, nothing = self.case, ForceCandidates((), {}, np.zeros((0, 0)))
+        """Return the part of the error that noise and plain tires explain, as errors are told."""
+        case = self.case
         if not np.isfinite(case.noise):
             return float("nan")
-        rests = force_ensemble(
-            case.problem,
-            after,
-            ForceRanking(case.problem, after, nothing),
-            noise=case.noise,
-            members=self.members,
-            progress=self.progress,
-        ).rests
-        share = force_floor(case.problem, after, rests, case.noise) / after.error
-        return case.error(after) * share
+        among = Hypotheses(self._problem(after, list(CATALOGUE.values())), plain_tires(case.quantity))
+        floor = force_floor(case.problem, after, among.base, FALSE_ALARM)
+        return case.error(after) * floor / after.error
+
+    def _problem(self, fit: ForceFit, catalogue: Sequence[Effect]) -> ForceProblem:
+        """Return the problem about a fitted brush."""
+        return ForceProblem(
+            self.case.problem.bench,
+            self.case.quantity,
+            fit.values,
+            catalogue,
+            noise=self.case.noise,
+            effects=fit.effects,
+            strengths=fit.strengths,
+        )

@@ -33,6 +33,9 @@ ROUGH = 5.0
 and no strengths."""
 MOST = 3
 """Effects of a hypothesis at most."""
+ALIKE = np.deg2rad(80.0)
+"""Angle between signatures below which one effect is tried in the place of another: it says what is
+tried, and not what is told."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -248,11 +251,25 @@ def select(
     free = [h for h in hypotheses.tried if h.plausible and np.isfinite(h.looseness)]
     if free:
         # the laws of what is there are off by less than those of what is not
-        return done(
-            "form_inadequate",
-            [min(free, key=lambda h: (h.looseness, len(h.names), -h.likelihood))],
-        )
+        best = min(free, key=lambda h: (h.looseness, len(h.names), -h.likelihood))
+        return done("form_inadequate", [best, *(_alike(hypotheses, best) if many else ())])
     return done("unknown", ())
+
+
+def _alike(hypotheses: Hypotheses, best: Hypothesis) -> list[Hypothesis]:
+    """Return hypotheses with one effect in the place of another, as good as one whose laws are off.
+
+    Those that are likeliest come first.
+    """
+    names, null = hypotheses.added(best), hypotheses.base.null
+    wanted = [
+        (tuple(other if each == name else each for each in names), best)
+        for name in names
+        for other in hypotheses.effects
+        if other not in names and null.angle(name, other) < ALIKE
+    ]
+    found = [h for h in dict.fromkeys(hypotheses.each(wanted)) if h is not None and h.plausible]
+    return sorted((h for h in found if h.looseness <= best.looseness), key=lambda h: -h.likelihood)
 
 
 def _further(leader: Hypothesis, effects: dict[str, Effect], most: int) -> list[str]:

@@ -6,14 +6,12 @@ import numpy as np
 
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.ensemble import ANGLE, SET_POINT
 from tirelib.diagnose.forces.fit import ForceFit, Problem
+from tirelib.infer.forces import ANGLE, SET_POINTS
 from tirelib.planning.criterion import Noise
 
-RATIO = 0.01
-"""Standard deviation of the measured slip ratio, relative."""
 SHARES = (0.0, *(2.0 ** np.arange(-3.0, 0.5, 0.5)).tolist())
-"""Sizes of set-point errors that are tried, over those of a diagnosis' variants."""
+"""Sizes of set-point errors that are tried, over those of a diagnosis."""
 
 
 class BlockWhitening:
@@ -63,7 +61,7 @@ class Counted:
     excess : float
         By which it is larger than noise and set points.
     share : float
-        How far set points are off, over what a diagnosis' variants have.
+        How far set points are off, over what a diagnosis has.
     """
 
     whiten: BlockWhitening
@@ -91,7 +89,7 @@ def counted_noise(
     case : ForceCase
     base : ForceFit
         The model without any of the suspects, fitted.
-    structure : shape (n_members, n)
+    structure : shape (m, n)
     suspected : shape (n_strengths, n), optional
         Slopes by the strengths of all suspects, over their ranges.
     """
@@ -130,10 +128,10 @@ def set_points(ahead: Problem, fit: ForceFit) -> FloatArray:
     """Return the change of the force for one standard deviation of each set point, (n, 4)."""
     at, here = ahead.bench.conditions, ahead.predict(fit.values, fit.changes)
     steps = {
-        "load": SET_POINT * at.load,
-        "pressure": SET_POINT * at.pressure,
+        "load": SET_POINTS["load"] * at.load,
+        "pressure": SET_POINTS["pressure"] * at.pressure,
         "slip_angle": np.full(len(at), ANGLE),
-        "slip_ratio": RATIO * at.slip_ratio,
+        "slip_ratio": SET_POINTS["slip_ratio"] * at.slip_ratio,
     }
     columns = []
     for name, step in steps.items():

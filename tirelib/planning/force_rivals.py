@@ -1,9 +1,7 @@
 """Rivals for a force: what the present points say of each, and what each foretells of others.
 
-As for strain (`tirelib.planning.rivals`), with points in the place of runs: variants of the brush
-that lack no effect stand beside the parameters and strengths as unknowns with a prior. Set points
-that are off in a block are no such variant, for there are more of them than variants: they belong
-to the noise, exactly.
+What plain tires show beside a brush stands beside its parameters and strengths as unknowns with a
+prior. Set points that are off in a block belong to the noise.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,21 +13,21 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.ensemble import variant
+from tirelib.diagnose.forces.diagnose import plain_tires
 from tirelib.diagnose.forces.fit import ForceFit, Problem, slopes_at, with_effect
-from tirelib.diagnose.forces.search import RANGE_SLACK
-from tirelib.effects import Effect
-from tirelib.errors import CalibrationError, TirelibError
+from tirelib.effects import CATALOGUE, Effect
+from tirelib.errors import TirelibError
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.force_points import ForcePoints
-from tirelib.infer.forces import WIDTH, varies
+from tirelib.infer.forces import WIDTH, ForceProblem, varies
+from tirelib.infer.hypothesis import SLACK
+from tirelib.infer.plain import pooled
+from tirelib.infer.problem import Point
 from tirelib.planning.criterion import NOTHING, Forecast, Noise
 from tirelib.planning.envelope import Envelope
 from tirelib.planning.force_noise import Counted, counted_noise, set_points
 from tirelib.planning.on_trial import fitted_rivals
 from tirelib.planning.sweep import campaign_sweep
-
-MEMBERS = 60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +75,7 @@ class ForceTrial:
     left_out : mapping of name to reason
         Suspects whose fit failed.
     size : float, [-]
-        Of the structural misfit; 1 is that of the variants of a diagnosis.
+        Of the structural misfit; 1 is that of plain tires.
     noise : Noise
         Of one further point, [N] or [N m].
     counted : Counted
@@ -168,41 +166,42 @@ def points_ahead(case: ForceCase, envelope: Envelope, wanted: FloatArray) -> Pro
     )
 
 
-def structure_rows(
-    joint: Problem, present: int, base: ForceFit, members: int, seed: int
-) -> FloatArray:
-    """Return what the base leaves of variants, each over the root of their number, (members, n).
+def structure_rows(joint: Problem, present: int, base: ForceFit) -> FloatArray:
+    """Return what the base leaves of what plain tires show, rows of one standard deviation, (m, n).
 
-    The base is fitted to the present points, the first ones of the joint problem.
-
-    Raises
-    ------
-    CalibrationError
-        If no variant can be computed.
+    Each is an effect at what plain tires show of it, or a smooth shape. The base is fitted to the
+    present points, the first ones of the joint problem.
     """
-    # one block: what differs from block to block is noise, and one draw holds for all points
-    whole = replace(joint, block=np.zeros(len(joint), dtype=np.int64))
-    random = np.random.default_rng(seed)
-    slopes, plain = slopes_at(joint, base), joint.predict(base.values, base.changes)
+    data = joint.bench.points.data
+    plain = joint.predict(base.values, base.changes)
+    told = {joint.quantity: np.where(np.isfinite(joint.measured), joint.measured, plain)}
+    points = replace(joint.bench.points, data=replace(data, **told))
+    problem = ForceProblem(
+        replace(joint.bench, points=points),
+        joint.quantity,
+        base.values,
+        list(CATALOGUE.values()),
+        noise=float("nan"),
+        effects=base.effects,
+        strengths=base.strengths,
+    )
+    spread = pooled(plain_tires(joint.quantity))
+    at, others = problem.start, problem.living
+    strengths = (*at.strengths, *(np.zeros(effect.components) for effect in others))
+    point = Point(at.base, (*at.effects, *others), strengths)
+    solved = problem.solve(point)
+    groups = dict(problem.remainder(point, solved))
+    last = problem.slopes(point, solved)
+    for effect in reversed(others):
+        last, groups[effect.name] = last[: -effect.components], last[-effect.components :]
+    rows = np.concatenate(
+        [np.sqrt(spread.get(name, 0.0)) * block for name, block in groups.items()]
+    )
+    slopes = slopes_at(joint, base)
     near = slopes[:, :present]
     inverse = np.linalg.inv(near @ near.T / joint.scale**2 + np.eye(len(near)) / WIDTH**2)
-    rows: list[FloatArray] = []
-    for _ in range(3 * members):
-        try:
-            made = variant(whole, base, 0.0, random) - plain
-        except TirelibError:
-            continue  # the draw is no tire
-        moves = inverse @ (near @ made[:present]) / joint.scale**2
-        rows.append(made - moves @ slopes)
-        if len(rows) == members:
-            break
-    if not rows:
-        raise CalibrationError(
-            "next test: no variant of the brush has a solution in the envelope; declare narrower "
-            "ranges"
-        )
-    found: FloatArray = np.array(rows) / np.sqrt(len(rows))
-    return found
+    moves = rows[:, :present] @ near.T @ inverse / joint.scale**2
+    return np.asarray(rows - moves @ slopes)
 
 
 def try_force_suspects(
@@ -222,7 +221,7 @@ def try_force_suspects(
     base : ForceFit
         The model without any of the suspects, fitted.
     suspects : sequence of (effect, start strength)
-    structure : shape (n_members, n)
+    structure : shape (m, n)
         At the present points (`structure_rows`).
     with_nothing : bool
         Whether the base itself is a rival.
@@ -290,7 +289,7 @@ def _rival(
     if name != NOTHING:
         effect, last = fit.effects[-1], len(fit.slopes)
         own = np.arange(last - effect.components, last)
-        slack = RANGE_SLACK * effect.scale * np.sqrt(covariance[own, own])
+        slack = SLACK * effect.scale * np.sqrt(covariance[own, own])
         low, high = effect.low - slack, effect.high + slack
         inside = (rival.strength >= low) & (rival.strength <= high)
         rival = replace(rival, in_range=bool(inside.all()))
@@ -307,7 +306,7 @@ def force_forecasts(
     trial : ForceTrial
     ahead : Problem
         Of their points, run after run.
-    structure : shape (n_members, n)
+    structure : shape (m, n)
         There.
     size : int
         Points of a run. Its set points are off alike in all of them.

@@ -28,7 +28,6 @@ from tirelib.planning.criterion import (
 )
 from tirelib.planning.envelope import Envelope, operating_at
 from tirelib.planning.force_rivals import (
-    MEMBERS,
     force_forecasts,
     points_ahead,
     structure_rows,
@@ -251,8 +250,6 @@ def force_next_test(
     envelope: Envelope,
     *,
     with_nothing: bool = False,
-    members: int = MEMBERS,
-    seed: int = 0,
     progress: Callable[[str], None] | None = None,
 ) -> NextTest:
     """Judge further runs of a force by how well they part suspects: points, or sweeps.
@@ -268,8 +265,6 @@ def force_next_test(
         Of `tirelib.planning.force_rivals.force_envelope`.
     with_nothing : bool
         Whether that nothing is missing is a rival too.
-    members, seed : int
-        Of the variants of the brush.
     progress : callable, optional
 
     Raises
@@ -285,8 +280,7 @@ def force_next_test(
         raise _hopeless(len(chosen))
     points = chosen[good]
     joint = points_ahead(case, envelope, points)
-    tell("variants of the brush")
-    structure = structure_rows(joint, n, base, members, seed)
+    structure = structure_rows(joint, n, base)
     trial = try_force_suspects(
         case, base, suspects, structure[:, :n], with_nothing=with_nothing, progress=progress
     )

@@ -46,9 +46,9 @@ class Suspects:
 def suspects_of(told: Mapping[str, Any], catalogue: Mapping[str, Effect]) -> Suspects:
     """Return the suspects of a diagnosis.
 
-    A found effect that is held back, with those that serve as well (forces); else named effects
-    that are indistinguishable; else a named effect with its twins that are alarms or
-    hints; else, where nothing is named, the leading hints, each against nothing.
+    Effects of the smallest sets that are not in all of them; else a named effect with its twins
+    that are alarms or hints; else, where nothing is named, the leading hints, each against
+    nothing.
 
     Parameters
     ----------
@@ -63,17 +63,15 @@ def suspects_of(told: Mapping[str, Any], catalogue: Mapping[str, Effect]) -> Sus
     """
     entries = {entry["effect"]: entry for entry in told["candidates"]}
     named = list(told["named"])
-    for held in told.get("held_back", []):
-        why = f"{held['effect']} is held back: {' and '.join(held['rivals'])} would serve as well"
-        chosen = [held["effect"], *held["rivals"]][:MOST]
-        return _of(chosen, named, entries, catalogue, False, why)
     alive = [
         name for name, e in entries.items() if e["level"] in ("alarm", "hint") and e["in_range"]
     ]
-    if told["verdict"] == "indistinguishable":
-        sets = told.get("sets") or [[name] for name in named]
-        common = [name for name in sets[0] if all(name in names for names in sets)]
-        differ = [name for name in named if name not in common]
+    alone = [[name] for name in named] if told["verdict"] == "indistinguishable" else []
+    sets = told.get("sets") or alone
+    if len(sets) > 1:
+        common = [name for name in named if all(name in names for names in sets)]
+        every = dict.fromkeys(name for names in sets for name in names)
+        differ = [name for name in every if not all(name in names for names in sets)]
         why = "the campaign cannot distinguish them"
         return _of(differ[:MOST], common, entries, catalogue, False, why)
     for name in named:

@@ -11,6 +11,7 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
+from tirelib.infer.plain import ROUGHLY
 from tirelib.report.page import number, unit_name
 
 TITLES = {
@@ -151,8 +152,8 @@ def _by_p(told: Mapping[str, Any]) -> str:
         )
     if told["verdict"] in ("unknown", "form_inadequate"):
         return (
-            f"Every hypothesis of up to three effects is rejected (p = {p} of the likeliest, "
-            f"{level} is needed): {told['misfit_of']} stands out of what plain tires show."
+            f"Every hypothesis that was tried is rejected (p = {p} of the likeliest, "
+            f"{level} is needed): {_stands(told['misfit_of'])} stands out of what plain tires show."
         )
     it = "it" if len(told["sets"][0]) == 1 else "them"
     return (
@@ -161,28 +162,38 @@ def _by_p(told: Mapping[str, Any]) -> str:
     )
 
 
+def _stands(name: str) -> str:
+    """Return what has the largest score in words."""
+    return f"the law of {name.removeprefix(ROUGHLY)}" if name.startswith(ROUGHLY) else name
+
+
 def _alternatives(told: Mapping[str, Any]) -> list[str]:
     """Return a sentence on other effects that explain the measurements equally well."""
     if told["verdict"] == "indistinguishable":
         return ["They explain these measurements equally well."]
     sets = told.get("sets") or []
     if len(sets) > 1:
-        listed = "; or ".join(" with ".join(names) for names in sets[1 : 1 + SHOWN])
+        listed = "; or ".join(_other(names, sets[0]) for names in sets[1 : 1 + SHOWN])
         return [f"Not ruled out: {listed}."]
     if not told["named"]:
         return []
-    rivals = [name for entry in told.get("held_back", ()) for name in entry["rivals"]]
     named = set(told["named"])
     others = [
         e["effect"]
         for e in told["candidates"]
         if e["effect"] not in named and e["level"] != "quiet"
     ]
-    if rivals:
-        return [f"Held back, since others would serve as well: {_some(rivals)}."]
     if others:
         return [f"Also conspicuous, but not needed in addition to what is named: {_some(others)}."]
     return ["No other effect of the catalogue explains these measurements as well."]
+
+
+def _other(names: Sequence[str], best: Sequence[str]) -> str:
+    """Return another set in words: of a large one, by what differs from the best."""
+    new, gone = ([n for n in a if n not in b] for a, b in ((names, best), (best, names)))
+    if len(best) <= SHOWN or not gone:
+        return " with ".join(names)
+    return f"{_and(new)} in the place of {_and(gone)}"
 
 
 def _blind(told: Mapping[str, Any]) -> list[str]:

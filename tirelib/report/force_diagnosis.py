@@ -8,7 +8,6 @@ import numpy as np
 from tirelib.diagnose.forces.assess import ForceAssessment
 from tirelib.diagnose.forces.document import exceeds, fold_words, next_test
 from tirelib.diagnose.forces.held_out import pooled
-from tirelib.diagnose.forces.search import ALARM
 from tirelib.report.comparison import BRUSH
 from tirelib.report.figures.compare_plot import Plot
 from tirelib.report.figures.force_left import residual_map
@@ -18,13 +17,11 @@ from tirelib.report.page import Table, number
 from tirelib.report.parts_page import Part, write_parts_page
 
 METHOD_TEXT = (
-    "All effects of the brush are fitted together. An effect's score is the misfit that returns "
-    "when it alone is removed, relative to the residual of the fit. The threshold is the largest "
-    "score among variants of the model that differ in structure and lack no effect: another shape "
-    "of the pressure, a carcass that turns, the shape of the Magic Formula, a smooth misfit over "
-    "slip and load, drift, delay, set-point errors, noise. An effect with a plausible strength "
-    "that an exact refit needs is an alarm from three times the threshold on, and a hint from the "
-    "threshold on. Named effects stand in the order of what each alone gains on held-out points."
+    "Every effect has a score: how much better the points are explained with it than without, "
+    "beside everything that plain tires show in addition to a brush, as a standard score. The "
+    "threshold is the score that plain tires exceed with the false-alarm probability. Beside no "
+    "effect of a named set may anything exceed it. Named effects stand in the order of what each "
+    "alone gains on held-out points."
 )
 
 
@@ -37,8 +34,8 @@ def answer_of(told: ForceAssessment) -> str:
         "none": f"No effect stands out: the error {before} {unit} (floor {floor}) gives no reason "
         "to name one.",
         "named": f"Missing: {names}. With {'them' if len(told.named) > 1 else 'it'} {fall}.",
-        "form_inadequate": f"Missing: {names}: {fall}. More is left than the structure of the "
-        "brush explains, so a law has the wrong form or more is missing.",
+        "form_inadequate": f"Missing: {names}: {fall}. More is left than plain "
+        "tires leave, so a law has the wrong form or more is missing.",
         "indistinguishable": f"One of {names} is missing; this campaign cannot distinguish them: "
         f"{fall}.",
         "unknown": "Something is missing that no effect of the catalogue explains; error "
@@ -87,7 +84,7 @@ def parts_of(told: ForceAssessment) -> list[Part]:
             "candidates",
             METHOD_TEXT,
             tables=[_candidates(told)],
-            plots=[score_bars(told.findings, ALARM)] if told.findings else [],
+            plots=[score_bars(told.findings)] if told.findings else [],
         ),
         Part("Error", "error", tables=[_errors(told)], plots=_fall(told)),
         Part("What is left", "left", _left_text(told), plots=maps),
@@ -110,7 +107,7 @@ def _summary(told: ForceAssessment) -> str:
 
 
 def _candidates(told: ForceAssessment) -> Table:
-    unit, factor, folds = told.case.unit, told.case.factor, told.diagnosis.folds
+    unit, factor = told.case.unit, told.case.factor
     rows = [
         [
             f.effect.name,
@@ -121,8 +118,8 @@ def _candidates(told: ForceAssessment) -> Table:
             ", ".join(number(float(x), 3) for x in f.strength),
             ", ".join(number(float(x), 2) for x in f.std),
             f.effect.unit,
-            number(factor * f.error_after, 3),
-            number(factor * pooled(f.held_after, folds), 3),
+            number(factor * told.diagnosis.error_with(f), 3),
+            number(factor * told.diagnosis.held_with(f), 3),
             number(f.power, 2),
         ]
         for f in told.findings
@@ -145,13 +142,12 @@ def _candidates(told: ForceAssessment) -> Table:
         rows,
         texts=4,
         note="Twins: effects whose signatures are less than 30 degrees apart. Power: chance that a "
-        "third of the range would be an alarm. Held out: for alarms only.",
+        "third of the range has a score beyond the threshold. Held out: for named effects only.",
     )
 
 
 def _errors(told: ForceAssessment) -> Table:
     found, factor, unit = told.diagnosis, told.case.factor, told.case.unit
-    scale = factor * told.case.problem.scale
     rows = [
         [
             f"noise of a point, from {told.case.repeats} repeated cells "
@@ -165,11 +161,9 @@ def _errors(told: ForceAssessment) -> Table:
         ],
         [f"error with the named effects [{unit}]", number(told.after, 4)],
         [
-            f"floor: the error that noise and the brush's structure explain [{unit}]",
+            f"floor: the error that noise and what plain tires show explain [{unit}]",
             number(told.floor, 4),
         ],
-        [f"residual when all effects are fitted together [{unit}]", number(scale * found.left, 4)],
-        [f"the same, largest of the variants [{unit}]", number(scale * found.most_left, 4)],
     ]
     for fold, old, new in zip(found.folds, found.held_before, found.held_final, strict=True):
         rows.append(
@@ -205,9 +199,7 @@ def _fall(told: ForceAssessment) -> list[Plot]:
 
 def _left_text(told: ForceAssessment) -> str:
     if not exceeds(told):
-        return (
-            "The remaining residual is no larger than that of model variants which lack no effect."
-        )
+        return "The remaining residual is no larger than what plain tires leave of a brush."
     guess = f" A guess at its law: {told.left.guess}." if told.left.guess else ""
     return f"The remaining residual lies {told.left.where}; it {told.left.scaling}.{guess}"
 

@@ -1,19 +1,16 @@
-"""Parts of a diagnosis of forces: folds, dead effects, twins, the bounded ranking, what is left."""
+"""Parts of a diagnosis of forces: folds, what is left, and laws of a verdict."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.unit.force_points import ANGLES, LOADS, MODEL, PRESSURES, VALUES
 from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
-from tirelib.diagnose.forces.candidates import force_candidates
-from tirelib.diagnose.forces.ensemble import force_ensemble
-from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force
+from tirelib.diagnose.forces.diagnose import diagnose_force
+from tirelib.diagnose.forces.fit import Problem, fit_force
 from tirelib.diagnose.forces.held_out import ForceFold, force_folds, pooled
 from tirelib.diagnose.forces.left import left_of
-from tirelib.diagnose.forces.ranking import ForceRanking
 from tirelib.effects import CATALOGUE, effect
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.force_points import force_points
@@ -46,101 +43,6 @@ def problem(
         np.full(n, 20.0),
     )
     return Problem.of(MODEL.bench(force_points(data)), "Fy", noise)
-
-
-@pytest.fixture(scope="module")
-def plain() -> tuple[Problem, ForceFit]:
-    made = problem()
-    return made, fit_force(made, VALUES)
-
-
-def test_dead_effects_are_told_with_the_condition_that_is_missing(
-    plain: tuple[Problem, ForceFit],
-) -> None:
-    found = force_candidates(*plain, list(CATALOGUE.values()))
-    assert found.dead["friction_speed"] == "no run varies speed"
-    assert found.dead["friction_temperature"].startswith("tread temperature is not measured")
-    assert found.dead["brush_camber"] == "no run varies camber"
-    assert found.dead["relaxation"].startswith("changes Fy at no point")
-    assert "one way only" in problem_with_speeds()
-    assert {"friction_load", "friction_pressure", "stiffness_pressure"} <= set(found.names)
-    assert not set(found.names) & set(found.dead)
-
-
-def problem_with_speeds() -> str:
-    """Why a tire that rolls one way at two speeds cannot show ply steer."""
-    made = problem()
-    at = made.bench.conditions
-    speed = np.where(np.arange(len(at)) % 4 < 2, 10.0, 20.0)
-    made = replace(made, bench=replace(made.bench, conditions=replace(at, speed=speed)))
-    return force_candidates(made, fit_force(made, VALUES), [CATALOGUE["ply_steer"]]).dead[
-        "ply_steer"
-    ]
-
-
-def test_an_effect_of_the_same_law_is_a_twin(plain: tuple[Problem, ForceFit]) -> None:
-    @effect("sticky", stage="brush", unit="1", low=-1, high=1, varies_with=("load",), source="test")
-    def sticky(state: object, strength: float) -> object:
-        "Friction over load once more."
-        return CATALOGUE["friction_load"].law(state, -2.0 * strength)
-
-    found = force_candidates(*plain, [CATALOGUE["friction_load"], sticky])
-    ((name, angle),) = found.twins(0)
-    assert name == "sticky"
-    assert angle < 1e-3
-
-
-def test_what_could_not_be_true_does_not_hide_what_is() -> None:
-    # measured: friction that falls with load
-    other = problem(friction_power=-0.15)
-    fitted = fit_force(other, VALUES)
-
-    @effect(
-        "wrong", stage="brush", unit="1", low=0.0, high=1.0, varies_with=("load",), source="test"
-    )
-    def wrong(state: object, strength: float) -> object:
-        "The same law with the other sign, which its range rules out."
-        return CATALOGUE["friction_load"].law(state, -strength)
-
-    found = force_candidates(other, fitted, [CATALOGUE["friction_load"], wrong])
-    scores = ForceRanking(other, fitted, found).scores(other.measured - fitted.predicted)
-    assert scores.strength[1][0] == pytest.approx(0.0, abs=1e-6)
-    assert scores.share[0] > 10.0
-    assert scores.share[1] == pytest.approx(0.0, abs=1e-6)
-    assert scores.inside.all()
-    alone = force_candidates(other, fitted, [wrong])
-    quiet = ForceRanking(other, fitted, alone).scores(other.measured - fitted.predicted)
-    assert quiet.share[0] == pytest.approx(0.0, abs=1e-6)
-
-
-def test_the_score_is_what_comes_back_when_an_effect_is_taken_out() -> None:
-    made = problem(friction_power=-0.15)
-    base = fit_force(made, VALUES)
-    found = force_candidates(made, base, list(CATALOGUE.values()))
-    ranking = ForceRanking(made, base, found)
-    rest = made.measured - base.predicted
-    scores = ranking.scores(rest)
-    first = found.names.index("friction_load")
-    fewer = force_candidates(
-        made, base, [c.effect for i, c in enumerate(found.living) if i != first]
-    )
-    without = ForceRanking(made, base, fewer).scores(rest)
-    back = (without.after**2 - scores.after**2) / scores.after
-    assert scores.score[first] == pytest.approx(back, rel=1e-6)
-
-
-def test_variants_differ_from_each_other_and_from_seed_to_seed_but_not_within_one(
-    plain: tuple[Problem, ForceFit],
-) -> None:
-    found = force_candidates(*plain, list(CATALOGUE.values()))
-    ranking = ForceRanking(*plain, found)
-    one, same, other = (
-        force_ensemble(*plain, ranking, noise=5.0, members=4, seed=seed) for seed in (1, 1, 2)
-    )
-    np.testing.assert_array_equal(one.scores, same.scores)
-    assert not np.array_equal(one.scores, other.scores)
-    assert np.ptp(one.before) > 0.0
-    assert (one.threshold >= one.scores).all()
 
 
 def test_steady_runs_hold_out_their_highest_set_points() -> None:
@@ -187,3 +89,50 @@ def test_what_is_left_is_told_by_slip_and_load_with_a_guess() -> None:
     power, half = left.powers["load"]
     assert np.isfinite(power)
     assert half > 0.0
+
+
+def test_a_law_of_the_same_kind_stands_beside_the_catalogues_as_a_twin() -> None:
+    @effect("sticky", stage="brush", unit="1", low=-1, high=1, varies_with=("load",), source="test")
+    def sticky(state: object, strength: float) -> object:
+        "Friction over load once more."
+        return CATALOGUE["friction_load"].law(state, -0.5 * strength)
+
+    found = diagnose_force(
+        problem(friction_power=-0.15), VALUES, [CATALOGUE["friction_load"], sticky], noise=5.0
+    )
+    assert found.verdict.kind == "indistinguishable"
+    assert set(found.named) == {"friction_load", "sticky"}
+    twins = {finding.effect.name: dict(finding.twins) for finding in found.findings}
+    assert twins["friction_load"]["sticky"] < 1e-2
+    assert {finding.level for finding in found.findings} == {"hint"}
+
+
+def test_what_could_not_be_true_is_not_named() -> None:
+    @effect("wrong", stage="brush", unit="1", low=0.0, high=1.0, varies_with=("load",), source="t")
+    def wrong(state: object, strength: float) -> object:
+        "The law of friction over load with the other sign, which its range rules out."
+        return CATALOGUE["friction_load"].law(state, -strength)
+
+    measured = problem(friction_power=-0.15)
+    both = diagnose_force(measured, VALUES, [CATALOGUE["friction_load"], wrong], noise=5.0)
+    assert both.named == ("friction_load",)
+    alone = diagnose_force(measured, VALUES, [wrong], noise=5.0)
+    assert (alone.verdict.kind, alone.named) == ("unknown", ())
+    assert alone.final is alone.base
+
+
+def test_errors_fall_from_step_to_step_to_that_of_the_final_model() -> None:
+    made = problem(friction_power=-0.15)
+    found = diagnose_force(made, VALUES, list(CATALOGUE.values()), noise=5.0)
+    assert found.named == ("friction_load",)
+    ((name, error, held),) = found.steps
+    assert name == "friction_load"
+    assert error == pytest.approx(found.final.error)
+    assert error < 0.2 * found.base.error
+    assert held == pytest.approx(pooled(found.held_final, found.folds))
+    assert held < 0.5 * pooled(found.held_before, found.folds)
+    first, *others = found.findings
+    assert (first.effect.name, first.level) == ("friction_load", "alarm")
+    assert found.error_with(first) == pytest.approx(error)
+    assert np.isnan(found.held_with(others[0]))
+    assert found.error_with(others[0]) <= found.base.error

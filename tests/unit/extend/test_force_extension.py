@@ -39,7 +39,7 @@ def case(tmp_path_factory: pytest.TempPathFactory, model: TireFile) -> ForceCase
 
 @pytest.fixture(scope="module")
 def added(case: ForceCase) -> ForceExtension:
-    return add_brush_effect(case, EFFECT, members=6)
+    return add_brush_effect(case, EFFECT)
 
 
 def test_the_planted_strength_comes_back_with_an_honest_interval(added: ForceExtension) -> None:
@@ -105,7 +105,7 @@ def test_errors_are_told_in_the_noise_of_a_point(
 
 def test_a_needless_effect_is_flagged(model: TireFile, tmp_path: Path) -> None:
     campaign = write_forces(tmp_path / "own", steady_runs(), "own")
-    found = add_brush_effect(force_case(campaign, model, CATALOGUE, "Fy"), EFFECT, members=4)
+    found = add_brush_effect(force_case(campaign, model, CATALOGUE, "Fy"), EFFECT)
     assert "not_significant" in found.flags or abs(found.strength[0]) < 0.01
 
 

@@ -59,7 +59,7 @@ def test_what_goes_together_in_a_block_beyond_its_set_points_is_more_noise() -> 
 def test_a_forecast_holds_what_the_present_points_tell_of_structure_and_set_points() -> None:
     made = case("pressure", 0.1)
     base, problem = fit_force(made.problem, VALUES), made.problem
-    structure = structure_rows(problem, len(problem), base, 8, 0)
+    structure = structure_rows(problem, len(problem), base)
     suspects = [(CATALOGUE["friction_pressure"], np.zeros(1))]
     trial = try_force_suspects(made, base, suspects, structure)
     (rival,) = trial.rivals

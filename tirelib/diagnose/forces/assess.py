@@ -8,9 +8,10 @@ import numpy as np
 from tirelib.campaign import Campaign
 from tirelib.compare.force_model import ForceModel, force_model_of
 from tirelib.compare.forces import UNITS, quantities_of, slips, usable_points
-from tirelib.diagnose.forces.diagnose import ForceDiagnosis, ForceFinding, diagnose_force
-from tirelib.diagnose.forces.ensemble import MEMBERS
+from tirelib.diagnose.diagnose import FALSE_ALARM, Finding
+from tirelib.diagnose.forces.diagnose import ForceDiagnosis, diagnose_force
 from tirelib.diagnose.forces.fit import ForceFit, Problem
+from tirelib.diagnose.forces.floor import force_floor
 from tirelib.diagnose.forces.left import ForceLeft, left_of
 from tirelib.effects import Effect
 from tirelib.errors import CalibrationError
@@ -171,28 +172,34 @@ class ForceAssessment:
     verdict : str
     named : tuple of str
         Empty without repeats.
-    findings : tuple of ForceFinding
+    findings : tuple of Finding
         At most hints without repeats.
+    floor : float
+        The part of the error with the named effects that noise and what plain tires show explain;
+        NaN without repeats.
     left : ForceLeft
         What no effect explains.
     messages : tuple of str
-    held_back : mapping of name to names
-        Effects that were found, with those that serve as well; they are not named.
     """
 
     case: ForceCase
     diagnosis: ForceDiagnosis
     verdict: str
     named: tuple[str, ...]
-    findings: tuple[ForceFinding, ...]
+    findings: tuple[Finding, ...]
+    floor: float
     left: ForceLeft
     messages: tuple[str, ...]
-    held_back: Mapping[str, tuple[str, ...]]
 
     @property
     def final(self) -> ForceFit:
         """The brush with the named effects."""
         return self.diagnosis.final if self.named else self.diagnosis.base
+
+    @property
+    def sets(self) -> tuple[tuple[str, ...], ...]:
+        """Smallest members of the confidence set, best first; empty where nothing is named."""
+        return self.diagnosis.verdict.sets if self.named else ()
 
     @property
     def before(self) -> float:
@@ -204,18 +211,12 @@ class ForceAssessment:
         """The error with the named effects."""
         return self.case.error(self.final)
 
-    @property
-    def floor(self) -> float:
-        """The part of that error which noise and the brush's structure explain."""
-        return self.after * self.diagnosis.floor / self.final.error
-
 
 def assess_forces(
     case: ForceCase,
     catalogue: Sequence[Effect],
     *,
-    members: int = MEMBERS,
-    seed: int = 0,
+    false_alarm: float = FALSE_ALARM,
     progress: Callable[[str], None] | None = None,
 ) -> ForceAssessment:
     """Return the diagnosis of a force with what its reader needs.
@@ -224,8 +225,8 @@ def assess_forces(
     ----------
     case : ForceCase
     catalogue : sequence of Effect
-    members, seed : int
-        Of the structural ensemble.
+    false_alarm : float
+        Probability with which a plain tire is said to lack something.
     progress : callable, optional
     """
     found = diagnose_force(
@@ -233,15 +234,13 @@ def assess_forces(
         case.model.values,
         catalogue,
         noise=case.noise,
-        repeats=case.repeats,
         effects=case.effects,
         strengths=case.strengths,
-        members=members,
-        seed=seed,
+        false_alarm=false_alarm,
         progress=progress,
     )
     messages = list(case.messages)
-    verdict, named, findings = found.verdict, found.named, found.findings
+    verdict, named, findings = found.verdict.kind, found.named, found.findings
     share = found.final.error / float(np.sqrt(np.mean(case.problem.measured**2)))
     if share > NO_FIT:
         verdict, named = "unknown", ()
@@ -260,29 +259,56 @@ def assess_forces(
         )
     if named and not any(fold.main for fold in found.folds):
         messages.append("nothing can be held out: too few conditions vary")
-    messages += _in_order(case, [f.effect for f in findings if f.effect.name in named])
-    left = left_of(case.problem, found.final if named else found.base)
-    held = found.doubts if named and verdict != "indistinguishable" else {}
-    for name, rivals in held.items():
-        messages.append(
-            f"{name} is held back: {' or '.join(rivals)} would serve as well in its place"
+    if named:
+        messages += _instead(found) if verdict == "form_inadequate" else []
+        messages += _in_order(case, [f.effect for f in findings if f.effect.name in named])
+    final = found.final if named else found.base
+    best = found.verdict.best if named else found.verdict.base
+    floor = force_floor(case.problem, final, best, false_alarm)
+    return ForceAssessment(
+        case,
+        found,
+        verdict,
+        named,
+        findings,
+        case.error(final) * floor / final.error if np.isfinite(case.noise) else float("nan"),
+        left_of(case.problem, final),
+        tuple(messages),
+    )
+
+
+def _instead(found: ForceDiagnosis) -> list[str]:
+    """Say which effects would serve as well in the place of named ones, and what is not needed."""
+    best, out = found.verdict.sets[0], []
+    for names in found.verdict.sets[1:]:
+        (gone,), (new,) = (sorted(set(a) - set(b)) for a, b in ((best, names), (names, best)))
+        if gone in found.named:
+            out.append(f"{new} serves as well in the place of {gone}")
+    if idle := [name for name in best if name not in found.named]:
+        out.append(
+            f"{' and '.join(idle)} would be needed as well, but no error on held-out points falls "
+            "with it"
         )
-    return ForceAssessment(case, found, verdict, named, findings, left, tuple(messages), held)
+    return out
 
 
 def _in_order(case: ForceCase, effects: Sequence[Effect]) -> list[str]:
-    """Say which conditions of named effects went with the order of measurement."""
+    """Say which conditions went with the order of measurement, if a named effect has to do with it.
+
+    A condition counts if a named effect goes with it, or a named drift may stand for it.
+    """
     at = case.problem.bench.conditions
     names = {name for effect in effects for name in effect.varies_with}
+    every = {"load", "pressure", "camber", "temperature", "speed"}
     out = []
-    for name in sorted(names & {"load", "pressure", "camber", "temperature", "speed"}):
+    for name in sorted(every if "order" in names else names & every):
         if not varies(at, name):
             continue
         together = float(np.corrcoef(getattr(at, name), at.order)[0, 1])
         if abs(together) > IN_ORDER:
             out.append(
-                f"{name} went with the order of measurement (correlation {together:.2f}): a "
-                "drift in its place serves worse, but one of another curve might not; repeat the "
-                f"first {name} at the end to know"
+                f"{name} went with the order of measurement (correlation {together:.2f}): an "
+                f"effect of {name} and a drift can hardly be told apart; repeat the first {name} "
+                "at the end to know"
             )
     return out

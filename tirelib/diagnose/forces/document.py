@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from tirelib.compare.forces import UNITS
+from tirelib.diagnose.diagnose import Finding
 from tirelib.diagnose.forces.assess import ForceAssessment
-from tirelib.diagnose.forces.diagnose import ForceFinding
 from tirelib.diagnose.forces.held_out import BLOCK, ForceFold, pooled
 from tirelib.units import from_si
 
@@ -23,7 +23,7 @@ CONDITION_UNITS = {
 
 def force_diagnosis_document(told: ForceAssessment) -> dict[str, Any]:
     """Return the numbers; errors are in the noise of a point, in N or Nm without repeats."""
-    found, case = told.diagnosis, told.case
+    found, case, judged = told.diagnosis, told.case, told.diagnosis.verdict
     factor = case.factor
     held_final = found.held_final if told.named else found.held_before
     return {
@@ -53,14 +53,16 @@ def force_diagnosis_document(told: ForceAssessment) -> dict[str, Any]:
             {"effect": name, "error": factor * error, "heldout_error": factor * held}
             for name, error, held in (found.steps if told.named else ())
         ],
-        "joint_error": factor * case.problem.scale * found.left,
-        "joint_floor": factor * case.problem.scale * found.most_left,
+        "false_alarm": judged.alpha,
+        "misfit": judged.best.statistic,
+        "misfit_floor": judged.best.limit(judged.alpha),
+        "misfit_of": judged.best.against,
         "verdict": told.verdict,
         "named": list(told.named),
-        "held_back": [
-            {"effect": name, "rivals": list(rivals), "test": parting(told, name, rivals)}
-            for name, rivals in told.held_back.items()
-        ],
+        "sets": [list(names) for names in told.sets],
+        "p": judged.best.p,
+        "p_std": judged.best.p_std,
+        "p_without": judged.base.p,
         "has": [effect.name for effect in found.base.effects],
         "candidates": [_candidate(finding, k + 1, told) for k, finding in enumerate(told.findings)],
         "dead": list(found.dead),
@@ -103,7 +105,7 @@ def fold_words(fold: ForceFold) -> str:
     return f"{fold.name} {value:.4g} {unit}"
 
 
-def _candidate(finding: ForceFinding, rank: int, told: ForceAssessment) -> dict[str, Any]:
+def _candidate(finding: Finding, rank: int, told: ForceAssessment) -> dict[str, Any]:
     factor = told.case.factor
     return {
         "effect": finding.effect.name,
@@ -112,13 +114,15 @@ def _candidate(finding: ForceFinding, rank: int, told: ForceAssessment) -> dict[
         "score": finding.score,
         "threshold": finding.threshold,
         "level": finding.level,
+        "p": finding.p,
+        "p_std": finding.p_std,
         "strength": plain(finding.strength),
         "std": plain(finding.std),
         "unit": finding.effect.unit,
         "range": [finding.effect.low, finding.effect.high],
         "in_range": finding.in_range,
-        "error_after": factor * finding.error_after,
-        "heldout_error_after": factor * pooled(finding.held_after, told.diagnosis.folds),
+        "error_after": factor * told.diagnosis.error_with(finding),
+        "heldout_error_after": factor * told.diagnosis.held_with(finding),
         "share": finding.share,
         "twins": [
             {"effect": twin, "angle_deg": float(np.rad2deg(angle))} for twin, angle in finding.twins
@@ -134,8 +138,8 @@ def plain(strength: Sequence[float] | np.ndarray) -> float | list[float]:
 
 
 def exceeds(told: ForceAssessment) -> bool:
-    """Return whether more is left than variants of the model leave after the same joint fit."""
-    return told.diagnosis.left > told.diagnosis.most_left
+    """Return whether more is left than plain tires leave."""
+    return told.verdict in ("unknown", "form_inadequate")
 
 
 def _unexplained(told: ForceAssessment) -> dict[str, Any]:
@@ -161,19 +165,12 @@ def next_test(told: ForceAssessment) -> dict[str, Any]:
     varies = sorted({v for name in told.named for v in by_name[name].varies_with})
     between: list[str] = []
     if told.verdict == "indistinguishable":
-        name, rivals = next(iter(told.diagnosis.doubts.items()))
-        between = [name, *rivals]
-        what = parting(told, name, rivals)
-    elif told.held_back:
-        name, rivals = next(iter(told.held_back.items()))
-        between = [name, *rivals]
-        what = f"{name} or {' or '.join(rivals)}: {parting(told, name, rivals)}"
-        if told.named:
-            what += f"; add {told.named[0]} (`tirelib add {told.named[0]}`) meanwhile"
+        between = list(told.named)
+        what = parting(told, between)
     elif told.verdict == "form_inadequate":
         what = (
-            f"add {told.named[0]} (`tirelib add {told.named[0]}`); more is left than the shape of "
-            f"the brush explains: more levels of {_and(varies)} would show the right law"
+            f"add {told.named[0]} (`tirelib add {told.named[0]}`); more is left than plain "
+            f"tires leave: more levels of {_and(varies)} would show the right law"
         )
     elif told.verdict == "named":
         what = f"add {told.named[0]} (`tirelib add {told.named[0]}`) and diagnose again"
@@ -189,10 +186,10 @@ def next_test(told: ForceAssessment) -> dict[str, Any]:
     return {"what": what, "between": between, "would_revive": lacking}
 
 
-def parting(told: ForceAssessment, name: str, rivals: Sequence[str]) -> str:
-    """Say which test parts an effect from those that serve as well."""
+def parting(told: ForceAssessment, names: Sequence[str]) -> str:
+    """Say which test parts effects that explain the points alike."""
     by_name = {finding.effect.name: finding.effect for finding in told.findings}
-    varied = {v for each in (name, *rivals) for v in by_name[each].varies_with}
+    varied = {v for name in names for v in by_name[name].varies_with}
     conditions = sorted(varied - {"order"})
     if "order" in varied:
         return (

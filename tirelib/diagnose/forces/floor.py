@@ -1,47 +1,38 @@
-"""What part of a force's error noise and the structure of the brush explain.
-
-With V the residuals of m measured variants that lack no
-effect and s the noise, the best linear prediction of a residual r by structure is
-
-    V' (V V' + m s^2 I)^-1 V r,
-
-and the floor is the rms of r without what the rest of it exceeds the noise by, and no more than 19
-of 20 variants leave.
-"""
+"""What part of a force's error noise and what plain tires show explain."""
 
 import numpy as np
-from scipy import linalg
 
-from tirelib.arrays import FloatArray
 from tirelib.diagnose.forces.fit import ForceFit, Problem
+from tirelib.identify.span import span
+from tirelib.infer.hypothesis import Hypothesis
+from tirelib.infer.null import PRIOR
+from tirelib.infer.plain import BASE, ROUGHLY
 
-SIZE = 0.95
-"""Share of the variants whose size still counts as the brush's: one less the false-alarm rate."""
 
+def force_floor(problem: Problem, fit: ForceFit, hypothesis: Hypothesis, alpha: float) -> float:
+    """Return the part of a fitted brush's rms that noise and what plain tires show explain, SI.
 
-def force_floor(problem: Problem, fit: ForceFit, rests: FloatArray, noise: float) -> float:
-    """Return the part of a fitted brush's rms that noise and structure explain, SI.
+    It is all of it unless the hypothesis is rejected; then it is what is left when the model takes
+    what stands out most, and laws of its effects that are off by as much as themselves.
 
     Parameters
     ----------
     problem : Problem
     fit : ForceFit
-    rests : shape (n_members, n)
-        Residuals of variants over the problem's scale.
-    noise : float, [N] or [N m]
-        Of a point; NaN without repeats.
-
-    Returns
-    -------
-    float
-        NaN without repeats or variants.
+    hypothesis : Hypothesis
+        That the fit's effects and no other are there.
+    alpha : float
+        False-alarm probability.
     """
-    if not np.isfinite(noise) or not len(rests):
-        return float("nan")
+    if hypothesis.p > alpha:
+        return fit.error
+    blocks = hypothesis.fit.rows
+    more = [rows for name, rows in blocks.items() if name.startswith(ROUGHLY)]
+    if not hypothesis.against.startswith(ROUGHLY):
+        more.append(PRIOR * blocks[hypothesis.against])
+    basis = span(blocks[BASE].T)
+    rows = np.concatenate(more) / problem.scale
+    rows = rows - (rows @ basis) @ basis.T
     left = (problem.measured - fit.predicted) / problem.scale
-    level = (noise / problem.scale) ** 2
-    inner = rests @ rests.T + len(rests) * level * np.eye(len(rests))
-    beyond = left - rests.T @ linalg.solve(inner, rests @ left, assume_a="pos")
-    excess = max(float(np.mean(beyond**2)) - level, 0.0)
-    usual = float(np.quantile(np.mean(rests**2, axis=1), SIZE))
-    return problem.scale * float(np.sqrt(min(max(float(np.mean(left**2)) - excess, 0.0), usual)))
+    taken = np.linalg.solve(rows @ rows.T + np.eye(len(rows)), rows @ left) @ rows
+    return min(fit.error, problem.scale * float(np.sqrt(np.mean((left - taken) ** 2))))
