@@ -164,7 +164,8 @@ class _Force:
         case = self.case
         if not np.isfinite(case.noise):
             return float("nan")
-        among = Hypotheses(self._problem(after, list(CATALOGUE.values())), plain_tires(case.quantity))
+        problem = self._problem(after, list(CATALOGUE.values()))
+        among = Hypotheses(problem, plain_tires(case.quantity))
         floor = force_floor(case.problem, after, among.base, FALSE_ALARM)
         return case.error(after) * floor / after.error
 

@@ -192,6 +192,8 @@ def parting(told: ForceAssessment, names: Sequence[str]) -> str:
     varied = {v for name in names for v in by_name[name].varies_with}
     conditions = sorted(varied - {"order"})
     if "order" in varied:
+        # every run has its slips again
+        conditions = [name for name in conditions if not name.startswith("slip")]
         return (
             f"repeat the first {_and(conditions)} at the end, at the highest load and slip: a "
             "drift has gone on, an effect of the condition is back where it was"
