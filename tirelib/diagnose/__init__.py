@@ -1,1 +1,1 @@
-"""Which physical effect is missing: a joint ranking held against variants of the model."""
+"""Which physical effect is missing, by the inference of the library."""

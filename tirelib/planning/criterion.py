@@ -68,7 +68,7 @@ class Trial(Protocol):
 
     @property
     def size(self) -> float:
-        """Of the structural misfit; 1 is that of the variants of a diagnosis."""
+        """Of the structural misfit; 1 is that of plain tires."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from tirelib.report.style import BLUE, FAINT, RED
 
 TITLE = "Which run to measure next"
 METHOD = (
-    "Every suspect is fitted to the present runs, with the differences between model variants as "
+    "Every suspect is fitted to the present runs, with what plain tires show beside a model as "
     "further unknowns. At each possible run one suspect is assumed to be true, with the "
     "uncertainty that the present runs leave, and the other is adapted within its own "
     "uncertainty. The chi-square that the other still misses is the separation; the smaller of "
