@@ -129,7 +129,9 @@ def _told(h: Hypothesis) -> dict[str, Any]:
         "limit": round(h.limit(0.05), 2),
         "against": h.against,
         "p": round(h.p, 4),
+        "law": h.law,
         "looseness": h.looseness,
+        "p_rival": round(h.p_rival, 4),
         "plausible": h.plausible,
         "strengths": [np.round(s, 5).tolist() for s in h.fit.strengths],
     }

@@ -3,7 +3,7 @@
     python build/structure/law.py
 
 Fits every campaign with one known effect with that effect, and prints for each family the log
-likelihood of the relative standard deviation of a law (`tirelib.infer.hypothesis.LAW`), summed
+likelihood of the relative standard deviation of a law (`tirelib.infer.hypothesis.LAWS`), summed
 over its campaigns. The other families' plain tires give the rest of the covariance.
 """
 
@@ -21,14 +21,14 @@ from structure.learn import FAMILIES, OUT, TABLE, say
 from tirelib.effects import CATALOGUE
 from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
-from tirelib.infer.hypothesis import LAW, law_errors
+from tirelib.infer.hypothesis import law_errors
 from tirelib.infer.null import OWN, Null
 from tirelib.infer.plain import BASE, Family, load, pooled
 from tirelib.infer.posterior import posterior
 from tirelib.infer.strain import StrainProblem
 from tirelib.threads import one_thread
 
-LOOSER = tuple(2.0 ** np.arange(-3, 4))
+GRID = tuple(0.15 * 2.0 ** np.arange(-3, 4))
 
 
 def main() -> None:
@@ -37,11 +37,11 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=OUT)
     parser.add_argument("--families", default=",".join(FAMILIES))
     options = parser.parse_args()
-    say(f"{'law error':36}" + " ".join(f"{LAW * looser:8.3f}" for looser in LOOSER))
+    say(f"{'law error':36}" + " ".join(f"{law:8.3f}" for law in GRID))
     with one_thread():
         for family in options.families.split(","):
             others = [f for f in load(TABLE)[0] if f.name != family]
-            total = np.zeros(len(LOOSER))
+            total = np.zeros(len(GRID))
             for file in sorted((options.out / family).glob("*.npz")):
                 kind = file.stem.split("-")[1]
                 if kind in CATALOGUE:
@@ -72,8 +72,8 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
         return None
     views = [fit.view(problem, width) for width in OWN]
     found = []
-    for looser in LOOSER:
-        allowed = {BASE: fit.widths**2, **law_errors(fit, looser)}
+    for law in GRID:
+        allowed = {BASE: fit.widths**2, **law_errors(fit, law)}
         found.append(max(Null(views, family, allowed).likelihood for family in others))
     return np.array(found)
 

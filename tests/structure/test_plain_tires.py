@@ -21,7 +21,7 @@ def test_the_p_values_are_those_of_the_table_that_is_shipped() -> None:
 
 UNLIKE = pytest.mark.xfail(
     strict=True,
-    reason="the continuum differs more from rig and ring than these do from each other: 6 of 40 of "
+    reason="the continuum differs more from rig and ring than these do from each other: 9 of 40 of "
     "its tires are rejected at 5 % (docs/theory/inference.md)",
 )
 

@@ -14,7 +14,7 @@ from tirelib.diagnose.guess import Guess, guess_law
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.span import span
-from tirelib.infer.hypothesis import Hypothesis, p_value
+from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.plain import BASE, ROUGHLY, Family, load
 from tirelib.infer.problem import Problem
 from tirelib.infer.select import Verdict, select
@@ -229,7 +229,7 @@ def findings_of(
             mean, covariance = null.beside(name)
             strength = effect.scale * mean
             std = effect.scale * np.sqrt(np.diag(covariance))
-        p, p_std = p_value(left[name], first.plain) if alone is None else (alone.p, alone.p_std)
+        p, p_std = first.judge.p(left[name]) if alone is None else (alone.p, alone.p_std)
         level = "alarm" if name in named else "hint" if name in members else "quiet"
         rows.append(
             Finding(

@@ -1,10 +1,10 @@
 """What a plan can find: effects planted in plain tires and judged by the statistic of the verdict.
 
 Plain tires of every family are put into the user's plan (`tirelib.infer.hypothesis.plain_tires`),
-with an effect at a given strength in addition. Each is judged by the families other than its own,
-to first order: nothing is missing while its statistic stays within the limit; else an effect is a
-member of the confidence set if nothing further exceeds the limit once it is fitted. The law is that
-of the catalogue, and the exact fits of a verdict are left out: the chances are optimistic.
+with an effect at a given strength in addition. Each is judged as the user's tire is, to first
+order: nothing is missing while its p-value exceeds the level; else an effect is a member of the
+confidence set if the p-value does so once it is fitted. The law is that of the catalogue, and the
+exact fits of a verdict are left out: the chances are optimistic.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.infer.hypothesis import Hypothesis, by_others, plain_tires, products
+from tirelib.infer.hypothesis import Hypothesis, plain_tires, products
 from tirelib.infer.null import Products
 from tirelib.infer.problem import Problem
 
@@ -64,15 +64,15 @@ class Plans:
         self, problem: Problem, base: Hypothesis, alpha: float, repeats: int, seed: int = 0
     ) -> None:
         self.problem, self.base = problem, base
-        self.limit = base.limit(alpha)
+        self.alpha = alpha
         self.effects = tuple(effect.name for effect in problem.living)
         view, _ = base.null.likeliest
-        families = [null.family for null in base.nulls]
+        families = [judge.family for judge in base.judges]
         random = np.random.default_rng(seed)
         self.tires = []
         for number, family in enumerate(families):
             count = len(range(number, repeats, len(families)))
-            every = plain_tires(problem, base.fit, family, {}, view.own, number)
+            every = plain_tires(problem, base.fit, family, {}, view.own)
             chosen = random.permutation(len(family))[:count]
             self.tires.append((family, every[chosen]))
 
@@ -93,25 +93,13 @@ class Plans:
         return self._judged([tires + rows for _, tires in self.tires])
 
     def _judged(self, waves: Sequence[FloatArray]) -> Judged:
-        nulls = self.base.nulls
-        rejected, members = [], []
-        for (family, _), tires in zip(self.tires, waves, strict=True):
-            if not len(tires):
-                continue
-            turned = products(self.problem, nulls[0].views, tires)
-            statistic, by = by_others(nulls, family, turned)
-            out = statistic > self.limit
-            rejected.append(out)
-            inside = np.zeros((len(self.effects), len(tires)), dtype=bool)
-            for place in np.unique(by[out]):
-                chosen = np.flatnonzero(out & (by == place))
-                some = _columns(turned, chosen)
-                null = nulls[place]
-                inside[:, chosen] = np.array(
-                    [null.left_of(some, name) <= self.limit for name in self.effects]
-                )
-            members.append(inside)
-        return Judged(self.effects, np.concatenate(rejected), np.concatenate(members, axis=1))
+        turned = products(self.problem, self.base.null.views, np.concatenate(waves))
+        rejected = self.base.p_values(turned) <= self.alpha
+        out = _columns(turned, np.flatnonzero(rejected))
+        members = np.zeros((len(self.effects), rejected.size), dtype=bool)
+        for inside, name in zip(members, self.effects, strict=True):
+            inside[rejected] = self.base.p_values(out, name) > self.alpha
+        return Judged(self.effects, rejected, members)
 
     def ratio(self, name: str, strength: float) -> float:
         """Return the error with an effect planted over that without, to first order.

@@ -7,14 +7,15 @@ hypothesis that is further off than laws are - gains the likelihood ratio
 
 a_j at its likeliest with its prior, k the size of what this tire shows of everything and that of
 the misfit which each run has for itself. Were the model of plain tires exact, L_j would be a chi-
-square of as many degrees of freedom n_j as a_j has components. It is not exact, and by more for one
-effect than for another. So each L_j / n_j counts in units of its mean over the family's plain
-tires, planted in the user's plan, or of 1 (an exact model) where that is larger; the cube root
-makes chi-squares of different n_j comparable (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931)
-684). The largest of these standard scores is what stands out.
+square of as many degrees of freedom n_j as a_j has components; the cube root makes chi-squares of
+different n_j comparable (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684). It is not
+exact, and by more for one effect than for another: plain tires of other families show more of some.
+So each score counts in units of what such tires have (`Null.among`): less their mean, over their
+standard deviation. The largest of these standard scores is what stands out.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -59,8 +60,9 @@ class Null:
         Of everything that may be there in addition to the hypothesis.
     counts : shape (n_names,)
         Components n_j of each.
-    scale : shape (n_names,)
-        Units of L_j / n_j, from `measure`.
+    centre, deviation : shape (n_names,)
+        Mean and standard deviation of the scores of plain tires of another family, from `among`; 0
+        and 1 where the model of plain tires is exact.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class Null:
         self.names = [name for name in blocks if name != BASE]
         self.blocks = [blocks[name] for name in self.names]
         self.counts = np.array([block.stop - block.start for block in self.blocks], dtype=float)
+        self.centre, self.deviation = np.zeros(len(self.names)), np.ones(len(self.names))
         typical = family.spread()
         self._weighed = []
         for view in views:
@@ -118,14 +121,8 @@ class Null:
             The only size of a run's own misfit.
         """
         plain, free = [], []
-        views = self.views if only is None else [only]
-        of_view = {id(view): each for view, each in zip(views, products, strict=True)}
-        for view, size, weighed in self._weighed:
-            if id(view) not in of_view:
-                continue
-            turned, square = of_view[id(view)]
-            gram, here = weighed.gram, weighed.right(turned)
-            level = weighed.gain(turned) - 0.5 * square + view.log_volume + size_prior(size)
+        for level, weighed, right in self._at(products, only):
+            gram, here = weighed.gram, weighed.right(right)
             if given is not None:
                 block, more = self.blocks[given], self._more(given, weighed)
                 level = level + taken(gram, here, block, more)
@@ -139,6 +136,22 @@ class Null:
             )
         gain = np.max(free, axis=0) - np.max(plain, axis=0)
         return np.asarray(2.0 * gain / self.counts[:, None])
+
+    def likelihood_of(self, products: Products) -> FloatArray:
+        """Return the largest log likelihood of k residuals over the sizes, (k,), [nats]."""
+        return np.asarray(np.max([level for level, _, _ in self._at(products)], axis=0))
+
+    def _at(
+        self, products: Products, only: View | None = None
+    ) -> Iterator[tuple[FloatArray, Weighed, FloatArray]]:
+        """Yield the log likelihood (k,) at every size, with the metric and the products B r."""
+        views = self.views if only is None else [only]
+        of_view = {id(view): each for view, each in zip(views, products, strict=True)}
+        for view, size, weighed in self._weighed:
+            if id(view) in of_view:
+                right, square = of_view[id(view)]
+                level = weighed.gain(right) - 0.5 * square + view.log_volume + size_prior(size)
+                yield level, weighed, right
 
     def _more(self, j: int, weighed: Weighed) -> FloatArray:
         """Return the variance of a block beyond that of plain tires."""
@@ -155,39 +168,54 @@ class Null:
     def about(self, views: Sequence[View]) -> "Null":
         """Return the same test, in the same units, of other normal equations."""
         other = Null(views, self.family, self.allowed)
-        other.scale = self.scale
+        other.centre, other.deviation = self.centre, self.deviation
         return other
 
-    def measure(self, own: Products) -> None:
-        """Take the family's own plain tires as the unit of every L_j / n_j."""
-        self.scale = np.maximum(self.ratios_of(own).mean(axis=1), 1.0)
+    def among(self, scores: FloatArray) -> "Null":
+        """Return this test in units of the scores (n_names, k) of plain tires of another family.
 
-    def scores_of(self, products: Products) -> FloatArray:
-        """Return the standard scores of k residuals, (n_names, k)."""
-        return self.standard(self.ratios_of(products))
+        No mean is less than 0 and no deviation less than 1, those of an exact model.
+        """
+        other = copy(self)
+        other.centre = np.maximum(scores.mean(axis=1), 0.0)
+        other.deviation = np.maximum(scores.std(axis=1), 1.0)
+        return other
+
+    def scores_of(self, products: Products, given: str = "") -> FloatArray:
+        """Return the standard scores of k residuals, (n_names, k).
+
+        With a further effect `given`, the hypothesis counts with it, and its score is that of
+        nothing.
+        """
+        j = self.names.index(given) if given else None
+        scores = self.standard(self.ratios_of(products, given=j))
+        if j is not None:
+            scores[j] = -np.inf
+        return scores
 
     def standard(self, ratios: FloatArray) -> FloatArray:
         """Return the standard scores of L_j / n_j, (n_names, k)."""
-        return standard(ratios / self.scale[:, None], self.counts[:, None])
-
-    @cached_property
-    def scores(self) -> FloatArray:
-        """The standard score of everything beside the hypothesis, (n_names,)."""
-        return self.scores_of(self._measured)[:, 0]
+        scores = standard(ratios, self.counts[:, None])
+        return np.asarray((scores - self.centre[:, None]) / self.deviation[:, None])
 
     @property
-    def _measured(self) -> Products:
+    def scores(self) -> FloatArray:
+        """The standard score of everything beside the hypothesis, (n_names,)."""
+        return self.standard(self._ratios)[:, 0]
+
+    @cached_property
+    def _ratios(self) -> FloatArray:
+        """L_j / n_j of the user's residual, (n_names, 1)."""
+        return self.ratios_of(self.measured)
+
+    @property
+    def measured(self) -> Products:
+        """Products of the user's residual."""
         return [(v.normal.right[:, None], np.array([v.normal.square])) for v in self.views]
 
     def left(self, names: Sequence[str]) -> dict[str, float]:
         """Return the largest standard score of anything else, with each further effect fitted."""
-        return {name: float(self.left_of(self._measured, name)[0]) for name in names}
-
-    def left_of(self, products: Products, name: str) -> FloatArray:
-        """Return the same of k residuals with one further effect fitted, (k,)."""
-        j = self.names.index(name)
-        scores = self.standard(self.ratios_of(products, given=j))
-        return np.asarray(np.delete(scores, j, axis=0).max(axis=0))
+        return {name: float(self.scores_of(self.measured, name).max()) for name in names}
 
     def explained(self) -> FloatArray:
         """Return coefficients of all rows by the hypothesis and what plain tires show, (m,)."""
@@ -221,7 +249,8 @@ class Null:
         _, covariance = self.beside(name)
         count = self.counts[j]
         spread = 2.0 / (9.0 * count)
-        least = max(limit * np.sqrt(spread) + 1.0 - spread, 0.0) ** 3 * count * self.scale[j]
+        score = limit * self.deviation[j] + self.centre[j]
+        least = max(score * np.sqrt(spread) + 1.0 - spread, 0.0) ** 3 * count
         size = strength**2 / float(np.mean(np.diag(covariance)))
         return float(stats.ncx2.sf(least, count, size))
 

@@ -11,7 +11,7 @@ missing; several, they cannot be told apart; none at all, something unknown is t
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -23,6 +23,8 @@ from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.plain import Family, pooled
 from tirelib.infer.posterior import SETTLED, Posterior, posterior
 from tirelib.infer.problem import Problem
+from tirelib.infer.rival import p_against
+from tirelib.threads import one_thread
 
 SINGLES, PARTNERS, LEADERS = 6, 3, 2
 """Hypotheses that are fitted exactly: single effects, partners of each leader, and leaders."""
@@ -153,6 +155,16 @@ class Hypotheses:
         self._made |= dict(zip(new, found, strict=True))
         return [self._made[frozenset(names)] for names, _ in wanted]
 
+    def against(self, hypothesis: Hypothesis, rival: Hypothesis) -> Hypothesis:
+        """Return a hypothesis that is not rejected with its p-value against a likelier one."""
+        ahead = rival.likelihood - hypothesis.likelihood
+        if hypothesis.p <= self.false_alarm or np.exp(-ahead) > self.false_alarm:
+            return hypothesis
+        p = p_against(self.problem, hypothesis, rival)
+        out = replace(hypothesis, rival=" and ".join(self.added(rival)), p_rival=p)
+        self._made[frozenset(self.added(hypothesis))] = out
+        return out
+
     def _alone(self, names: Sequence[str], near: Hypothesis) -> Hypothesis | None:
         """Return a hypothesis from a fit nearby; None where no fit settles."""
         more = [self.effects[name] for name in names]
@@ -167,6 +179,20 @@ class Hypotheses:
             return self._tested(fit)
         except TirelibError:
             return None
+
+    def needless(self, hypothesis: Hypothesis) -> bool:
+        """Return whether some of a hypothesis' effects, their laws off, explain the runs as well.
+
+        Then a law is not right; that more effects cover what it leaves does not show that they are
+        there.
+        """
+        return any(
+            h.plausible
+            and np.isfinite(h.looseness)
+            and set(h.names) < set(hypothesis.names)
+            and h.likelihood >= hypothesis.likelihood
+            for h in self.tried
+        )
 
     def added(self, hypothesis: Hypothesis) -> tuple[str, ...]:
         """Return the names of a hypothesis' further effects."""
@@ -196,6 +222,7 @@ class Hypotheses:
         return judged(self.problem, fit, self.families, self.false_alarm, own_effects=had)
 
 
+@one_thread()
 def select(
     problem: Problem,
     families: Sequence[Family],
@@ -236,24 +263,42 @@ def select(
             ]
         )
         # two leaders may lead to one and the same set
-        fitted = [h for h in dict.fromkeys(level) if h is not None and h.plausible]
-        fitted.sort(key=lambda h: -h.likelihood)
-        members = [h for h in fitted if h.p > alpha]
+        every = sorted(
+            (h for h in dict.fromkeys(level) if h is not None), key=lambda h: -h.likelihood
+        )
+        # a rival out of its range is not there, but something that looks like it may be
+        rivals = [h for h in every if np.isfinite(h.looseness)]
+        fitted = [hypotheses.against(h, rivals[0]) if rivals else h for h in every if h.plausible]
+        staying = [h for h in fitted if h.p > alpha]
+        members = [h for h in staying if not hypotheses.needless(h)]
+        if staying and not members:
+            break
         if members:
             return done("named" if len(members) == 1 else "indistinguishable", members)
         leaders = fitted[: LEADERS if size == 1 else 1]
     leader = leaders[0] if leaders else None
-    while many and leader is not None and not np.isfinite(leader.looseness):
+    while many and leader is not None and leader.plausible and not np.isfinite(leader.looseness):
         further = _further(leader, hypotheses.effects, 1)
         leader = hypotheses.at((*hypotheses.added(leader), *further), leader) if further else None
-        if leader is not None and not leader.plausible:
-            break
-    free = [h for h in hypotheses.tried if h.plausible and np.isfinite(h.looseness)]
-    if free:
-        # the laws of what is there are off by less than those of what is not
-        best = min(free, key=lambda h: (h.looseness, len(h.names), -h.likelihood))
+    found = many and leader is not None and leader.plausible
+    best = leader if found else _with_loose_laws(hypotheses)
+    if best is not None:
         return done("form_inadequate", [best, *(_alike(hypotheses, best) if many else ())])
     return done("unknown", ())
+
+
+def _with_loose_laws(hypotheses: Hypotheses) -> Hypothesis | None:
+    """Return the smallest hypothesis that stays if its laws are off by as much as themselves.
+
+    It is the likeliest such of its size; one that is out of its range is not told.
+    """
+    for size in range(1, MOST + 1):
+        same = [h for h in hypotheses.tried if len(hypotheses.added(h)) == size]
+        loose = [h for h in same if 1.0 < h.looseness < np.inf]
+        best = max(loose, key=lambda h: h.likelihood, default=None)
+        if best is not None and best.plausible:
+            return best
+    return None
 
 
 def _alike(hypotheses: Hypotheses, best: Hypothesis) -> list[Hypothesis]:

@@ -432,14 +432,14 @@ class StrainProblem:
     ) -> Sequence[FloatArray]:
         """Return how what effects do would look if their laws were roughly right."""
         each = zip(rows, ranges, strict=True)
-        return [self._roughly(float(np.linalg.norm(size)) * own) for own, size in each]
+        return [self._roughly(_as_large(own, size)) for own, size in each]
 
     def _roughly(self, rows: FloatArray) -> FloatArray:
         """Return how rows would look if their law were roughly right.
 
-        Each goes otherwise with load, pressure, speed and time; and smooth shapes over the wheel
-        angle, as large as the rows are in that run, are added, constant or going with load or
-        speed.
+        Each goes otherwise with load, pressure, speed and time; acts a little further ahead or
+        behind, and more or less sharply; and smooth shapes over the wheel angle, as large as the
+        rows are in that run, are added, constant or going with load or speed.
         """
         p = self.data.points
         conditions = np.stack(
@@ -458,7 +458,18 @@ class StrainProblem:
         shape = bumps(GRID / self.half_angle[:, None], SHAPES.knots, SHAPES.reach) * size
         shape = shape - shape.mean(axis=2, keepdims=True)
         going = [shape * factor[:, None] for factor in conditions[:2]]
-        return np.concatenate([otherwise, shape, *going])
+        return np.concatenate([otherwise, *self._elsewhere(rows), shape, *going])
+
+    def _elsewhere(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return how rows change as they move by half a contact, and as they blur by as much.
+
+        The terms of first and second order of a Taylor series in the half contact angle.
+        """
+        order = np.fft.rfftfreq(GRID.size, 1.0 / GRID.size)
+        slope = 1j * self.half_angle[:, None] * order
+        waves = np.fft.rfft(rows)
+        moved, blurred = (np.fft.irfft(by * waves, n=GRID.size) for by in (slope, slope**2 / 2.0))
+        return moved, blurred
 
     def _nearby(self, square: FloatArray) -> FloatArray:
         """Return squares (n_runs, n_phi) averaged over about half a contact's length."""
@@ -511,6 +522,16 @@ def in_base(values: Mapping[str, float | FloatArray]) -> set[str]:
     """Return the effects that a tire's base model fits as numbers."""
     numbers = {coordinate.name for coordinate in coordinates(values)}
     return {effect for effect, number in IN_BASE.items() if number in numbers}
+
+
+def _as_large(rows: FloatArray, ranges: FloatArray) -> FloatArray:
+    """Return rows (components, ...), each as large as what all do together at these strengths.
+
+    Components may oppose each other: what is left of them is what a law can be off by.
+    """
+    together = float(np.sqrt(np.mean(np.tensordot(ranges, rows, axes=1) ** 2)))
+    own = np.sqrt(np.mean(rows**2, axis=tuple(range(1, rows.ndim)), keepdims=True))
+    return np.asarray(rows * (together / own))
 
 
 def _with_changes(

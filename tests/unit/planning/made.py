@@ -22,7 +22,7 @@ from tirelib.planning.suspects import Suspects, given_suspects
 
 NOISE = 2e-6
 PLANTED, TWIN = "temperature", "dynamic_stiffening"
-STRENGTH = 0.05
+STRENGTH = 0.035
 CONDITIONS = (
     (3000.0, 1.8e5, 11.0),
     (6000.0, 2.4e5, 11.0),

@@ -1,0 +1,79 @@
+"""A rival that explains the runs much better puts a hypothesis out of the set."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tests.unit.infer.linear_problem import EFFECTS, N, Toy, drawn, family
+from tirelib.arrays import FloatArray
+from tirelib.effects import Effect
+from tirelib.infer.hypothesis import LAWS
+from tirelib.infer.rival import p_against
+from tirelib.infer.select import Hypotheses, select
+
+FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
+LAW, WAYS = LAWS[1], 30
+STRENGTH = 1.2
+
+
+class Covered(Toy):
+    """A vague law, twist, whose error covers an exact one, bend."""
+
+    def __init__(self, measured: FloatArray) -> None:
+        super().__init__(measured)
+        random = np.random.default_rng(21)
+        self.ways = random.standard_normal((WAYS, N))
+        off = 0.2 * LAW * random.standard_normal(WAYS) @ self.ways
+        self.by["bend"] = self.by["twist"] + off
+
+    def roughly(
+        self, effects: Sequence[Effect], rows: Sequence[FloatArray], ranges: Sequence[FloatArray]
+    ) -> list[FloatArray]:
+        exact = {"swell": 1.0, "bend": 1e-3, "twist": 1.0}
+        whole = float(np.linalg.norm(self.by["twist"]))
+        size = [float(np.linalg.norm(r @ own)) / whole for r, own in zip(ranges, rows, strict=True)]
+        return [
+            exact[effect.name] * each * self.ways
+            for effect, each in zip(effects, size, strict=True)
+        ]
+
+
+def planted(name: str, seed: int) -> Covered:
+    random = np.random.default_rng(seed)
+    toy = Covered(drawn(random))
+    done = STRENGTH * toy.by[name][0]
+    (ways,) = toy.roughly([EFFECTS[name]], [done[None]], [np.ones(1)])
+    toy.measured = toy.measured + done + LAW * random.standard_normal(WAYS) @ ways
+    return toy
+
+
+def test_an_exact_law_puts_a_vague_one_that_covers_it_out_of_the_set() -> None:
+    found = select(planted("bend", 3), FAMILIES)
+    assert found.sets == (("bend",),)
+    covered = found.hypotheses.at(["twist"])
+    assert covered is not None
+    # nothing stands out beside the vague law: only its rival puts it out of the set
+    assert covered.judge.p(covered.statistic)[0] > 0.05
+    assert covered.rival == "bend"
+    assert covered.p == covered.p_rival <= 0.05
+
+
+def test_a_true_hypothesis_is_seldom_put_out_by_a_rival() -> None:
+    out = 0
+    for seed in range(16):
+        among = Hypotheses(planted("twist", 40 + seed), FAMILIES)
+        true, rival = among.at(["twist"]), among.at(["bend"])
+        assert true is not None
+        assert rival is not None
+        out += p_against(among.problem, true, rival) <= 0.05
+    assert out <= 3  # the upper 98 % bound of 5 % of 16
+
+
+def test_a_rival_that_gains_nothing_puts_nothing_out() -> None:
+    toy = Toy(drawn(np.random.default_rng(4)), alike=True)
+    toy.measured = toy.measured + 0.6 * toy.by["twist"][0]
+    among = Hypotheses(toy, FAMILIES)
+    one, other = among.at(["twist"]), among.at(["bend"])
+    assert one is not None
+    assert other is not None
+    assert p_against(toy, one, other) > 0.2
