@@ -229,7 +229,7 @@ def findings_of(
             mean, covariance = null.beside(name)
             strength = effect.scale * mean
             std = effect.scale * np.sqrt(np.diag(covariance))
-        p, p_std = first.judge.p(left[name]) if alone is None else (alone.p, alone.p_std)
+        p, p_std = first.p_of(left[name]) if alone is None else (alone.p, alone.p_std)
         level = "alarm" if name in named else "hint" if name in members else "quiet"
         rows.append(
             Finding(

@@ -67,7 +67,7 @@ class Plans:
         self.alpha = alpha
         self.effects = tuple(effect.name for effect in problem.living)
         view, _ = base.null.likeliest
-        families = [judge.family for judge in base.judges]
+        families = [null.family for null in base.nulls]
         random = np.random.default_rng(seed)
         self.tires = []
         for number, family in enumerate(families):

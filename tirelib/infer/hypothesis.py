@@ -1,7 +1,9 @@
 """A hypothesis, that these effects and no other are missing, with its test.
 
-Its statistic is the largest standard score of anything beside it, as plain tires of each family
-have it in the user's plan with the hypothesis planted (`tirelib.infer.judge`). The rank of the
+Its statistic is the largest standard score of anything beside it (`tirelib.infer.null`), by the
+family of plain tires that excuses most. A user's tire belongs to none of the families, and a test
+by what its own family shows would be too sure. So the p-value is calibrated on plain tires, with
+the hypothesis planted in the user's plan, each by the families other than its own. The rank of the
 user's statistic among a family's tires is a p-value; the largest over the families counts, so that
 a tire which differs from the known families no more than any of them does from the others is
 covered.
@@ -13,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.infer.judge import Judge
 from tirelib.infer.null import OWN, PRIOR, Null, Products
 from tirelib.infer.plain import BASE, ROUGHLY, Family, View
 from tirelib.infer.posterior import Posterior
@@ -34,8 +35,10 @@ class Hypothesis:
     Attributes
     ----------
     fit : Posterior
-    judges : tuple of Judge
-        One for every family, that of the largest p-value first.
+    nulls : tuple of Null
+        Of every family.
+    plain : tuple of shape (n_tires,)
+        Statistic of each plain tire by the families other than its own, by family.
     law : float
         Relative standard deviation by which its laws are off.
     looseness : float
@@ -52,7 +55,8 @@ class Hypothesis:
     """
 
     fit: Posterior
-    judges: tuple[Judge, ...]
+    nulls: tuple[Null, ...]
+    plain: tuple[FloatArray, ...]
     law: float
     looseness: float
     plausible: bool
@@ -66,14 +70,9 @@ class Hypothesis:
         return self.fit.names
 
     @property
-    def judge(self) -> Judge:
-        """The family whose tires the user's is most like."""
-        return self.judges[0]
-
-    @property
     def null(self) -> Null:
-        """The test by which the statistic is: of another family, in units of the judge's tires."""
-        return self.judge.null
+        """That of the family that excuses most."""
+        return _excusing(self.nulls)
 
     @property
     def scores(self) -> dict[str, float]:
@@ -93,21 +92,26 @@ class Hypothesis:
     @property
     def p(self) -> float:
         """p-value of the hypothesis: of the statistic, or of its rival if that is smaller."""
-        return min(self.judge.p(self.statistic)[0], self.p_rival)
+        return min(self.p_of(self.statistic)[0], self.p_rival)
 
     @property
     def p_std(self) -> float:
         """Standard deviation of the p-value, from the number of plain tires."""
-        return self.judge.p(self.statistic)[1]
+        return self.p_of(self.statistic)[1]
+
+    def p_of(self, statistic: float) -> tuple[float, float]:
+        """Return the p-value of a statistic among plain tires, and its standard deviation."""
+        p = float(_p(np.array([statistic]), self.plain)[0])
+        count = min(map(len, self.plain))
+        return p, max(float(np.sqrt(p * (1.0 - p) / count)), 1.0 / (count + 1))
 
     def limit(self, alpha: float) -> float:
         """Return the statistic from which on the p-value is at most alpha."""
-        return self.judge.limit(alpha)
+        return max(float(np.quantile(each, 1.0 - alpha, method="higher")) for each in self.plain)
 
     def p_values(self, products: Products, given: str = "") -> FloatArray:
         """Return the p-values of k residuals, (k,); arguments are those of `Null.scores_of`."""
-        p = [judge.p_values(products, given) for judge in self.judges]
-        return np.asarray(np.max(p, axis=0))
+        return _p(_statistic(self.nulls, products, given), self.plain)
 
 
 def judged(
@@ -136,14 +140,14 @@ def judged(
     for law in (*laws, *loose):
         best = int(np.argmax(levels[min(law, LAWS[-1])]))
         tested = _tested(problem, fit, views, families, law, best)
-        if law == laws[0]:
-            judges, used = tested, law
-        if _p(tested[0]) > alpha:
+        nulls, plain = tested
+        stays = _p(np.array([_excusing(nulls).scores.max()]), plain)[0] > alpha
+        if law == laws[0] or (stays and law != LOOSEST):
+            kept = *tested, law
+        if stays:
             looseness = max(law / LAWS[-1], 1.0)
-            if law != LOOSEST:
-                judges, used = tested, law
             break
-    return Hypothesis(fit, judges, used, looseness, plausible(fit, own_effects), likelihood)
+    return Hypothesis(fit, *kept, looseness, plausible(fit, own_effects), likelihood)
 
 
 def _null(views: Sequence[View], fit: Posterior, family: Family, law: float) -> Null:
@@ -168,20 +172,37 @@ def _tested(
     families: Sequence[Family],
     law: float,
     best: int,
-) -> tuple[Judge, ...]:
-    """Return every family's judge; `best` is the likeliest size of a run's own misfit."""
+) -> tuple[tuple[Null, ...], tuple[FloatArray, ...]]:
+    """Return the tests by every family, and the statistics of plain tires by the others.
+
+    `best` is the likeliest size of a run's own misfit.
+    """
     near = views[max(best - 1, 0) : best + 2]
-    nulls = [_null(near, fit, family, law) for family in families]
-    judges = []
+    nulls = tuple(_null(near, fit, family, law) for family in families)
+    plain = []
     for family in families:
         tires = plain_tires(problem, fit, family, law_errors(fit, law), OWN[best])
-        judges.append(Judge.of(family, nulls, products(problem, near, tires)))
-    judges.sort(key=lambda judge: (-_p(judge), float(judge.null.scores.max())))
-    return tuple(judges)
+        others = [null for null in nulls if null.family is not family]
+        plain.append(_statistic(others, products(problem, near, tires)))
+    return nulls, tuple(plain)
 
 
-def _p(judge: Judge) -> float:
-    return judge.p(float(judge.null.scores.max()))[0]
+def _excusing(nulls: Sequence[Null]) -> Null:
+    """Return the test by the family that excuses most of the user's residual."""
+    return min(nulls, key=lambda null: float(null.scores.max()))
+
+
+def _statistic(nulls: Sequence[Null], products: Products, given: str = "") -> FloatArray:
+    """Return the largest score of k residuals by the family that excuses most, (k,)."""
+    return np.asarray(np.min([n.scores_of(products, given).max(axis=0) for n in nulls], axis=0))
+
+
+def _p(statistic: FloatArray, plain: Sequence[FloatArray]) -> FloatArray:
+    """Return the largest rank of statistics (k,) among the tires of any family, as p-values."""
+    ranks = [
+        (1 + np.sum(tires[:, None] >= statistic, axis=0)) / (len(tires) + 1) for tires in plain
+    ]
+    return np.asarray(np.max(ranks, axis=0))
 
 
 def plain_tires(

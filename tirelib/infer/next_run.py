@@ -4,7 +4,7 @@ The statistic is that of the verdict. At each possible run one rival A is taken 
 measurement is drawn from what the present runs leave open of A - its numbers, its strengths, what
 plain tires show in addition to a model - and from noise, set points and the misfit that a run has
 for itself. The other rival B is then tested with this run behind the present ones: B leaves the
-confidence set if its statistic (`tirelib.infer.judge`) exceeds its limit. The share of
+confidence set if its statistic (`tirelib.infer.hypothesis`) exceeds its limit. The share of
 draws in which it does is the chance that the run tells, if A is true; likewise with B as true (Box
 and Hill, Technometrics 9 (1967) 57, with a test in place of an entropy). All of it is of first
 order about the fits.

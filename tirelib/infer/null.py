@@ -8,14 +8,12 @@ hypothesis that is further off than laws are - gains the likelihood ratio
 a_j at its likeliest with its prior, k the size of what this tire shows of everything and that of
 the misfit which each run has for itself. Were the model of plain tires exact, L_j would be a chi-
 square of as many degrees of freedom n_j as a_j has components; the cube root makes chi-squares of
-different n_j comparable (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684). It is not
-exact, and by more for one effect than for another: plain tires of other families show more of some.
-So each score counts in units of what such tires have (`Null.among`): less their mean, over their
-standard deviation. The largest of these standard scores is what stands out.
+different n_j comparable (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684). The largest of
+these standard scores is what stands out. The model of plain tires is not exact: how large scores
+get on plain tires is measured (`tirelib.infer.hypothesis`).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -60,9 +58,6 @@ class Null:
         Of everything that may be there in addition to the hypothesis.
     counts : shape (n_names,)
         Components n_j of each.
-    centre, deviation : shape (n_names,)
-        Mean and standard deviation of the scores of plain tires of another family, from `among`; 0
-        and 1 where the model of plain tires is exact.
     """
 
     def __init__(
@@ -76,7 +71,6 @@ class Null:
         self.names = [name for name in blocks if name != BASE]
         self.blocks = [blocks[name] for name in self.names]
         self.counts = np.array([block.stop - block.start for block in self.blocks], dtype=float)
-        self.centre, self.deviation = np.zeros(len(self.names)), np.ones(len(self.names))
         typical = family.spread()
         self._weighed = []
         for view in views:
@@ -166,20 +160,8 @@ class Null:
         return float(self._weighed[int(np.argmax(self._levels))][1])
 
     def about(self, views: Sequence[View]) -> "Null":
-        """Return the same test, in the same units, of other normal equations."""
-        other = Null(views, self.family, self.allowed)
-        other.centre, other.deviation = self.centre, self.deviation
-        return other
-
-    def among(self, scores: FloatArray) -> "Null":
-        """Return this test in units of the scores (n_names, k) of plain tires of another family.
-
-        No mean is less than 0 and no deviation less than 1, those of an exact model.
-        """
-        other = copy(self)
-        other.centre = np.maximum(scores.mean(axis=1), 0.0)
-        other.deviation = np.maximum(scores.std(axis=1), 1.0)
-        return other
+        """Return the same test of other normal equations."""
+        return Null(views, self.family, self.allowed)
 
     def scores_of(self, products: Products, given: str = "") -> FloatArray:
         """Return the standard scores of k residuals, (n_names, k).
@@ -195,8 +177,7 @@ class Null:
 
     def standard(self, ratios: FloatArray) -> FloatArray:
         """Return the standard scores of L_j / n_j, (n_names, k)."""
-        scores = standard(ratios, self.counts[:, None])
-        return np.asarray((scores - self.centre[:, None]) / self.deviation[:, None])
+        return standard(ratios, self.counts[:, None])
 
     @property
     def scores(self) -> FloatArray:
@@ -249,8 +230,7 @@ class Null:
         _, covariance = self.beside(name)
         count = self.counts[j]
         spread = 2.0 / (9.0 * count)
-        score = limit * self.deviation[j] + self.centre[j]
-        least = max(score * np.sqrt(spread) + 1.0 - spread, 0.0) ** 3 * count
+        least = max(limit * np.sqrt(spread) + 1.0 - spread, 0.0) ** 3 * count
         size = strength**2 / float(np.mean(np.diag(covariance)))
         return float(stats.ncx2.sf(least, count, size))
 

@@ -29,11 +29,11 @@ def p_against(problem: Problem, hypothesis: Hypothesis, rival: Hypothesis) -> fl
     modelled = fit.rest - np.tensordot(_coordinates(fit), fit.rows[BASE], axes=1)
     laws, own = law_errors(fit, hypothesis.law), hypothesis.null.likeliest[0].own
     p = [float(np.exp(-ratio))]
-    for judge in hypothesis.judges:
+    for family in (null.family for null in hypothesis.nulls):
         # what is measured where the hypothesis is true, less what is measured
-        moved = plain_tires(problem, fit, judge.family, laws, own) - modelled
-        gains = _likelihood(problem, rival, judge.family, moved) - _likelihood(
-            problem, hypothesis, judge.family, moved
+        moved = plain_tires(problem, fit, family, laws, own) - modelled
+        gains = _likelihood(problem, rival, family, moved) - _likelihood(
+            problem, hypothesis, family, moved
         )
         p.append((1 + int(np.sum(gains >= ratio))) / (len(gains) + 1))
     return max(p)
@@ -43,7 +43,7 @@ def _likelihood(
     problem: Problem, hypothesis: Hypothesis, family: Family, moved: FloatArray
 ) -> FloatArray:
     """Return the log likelihood by the families but one of the runs moved by waveforms, (k,)."""
-    others = [null for null in hypothesis.judge.nulls if null.family is not family]
+    others = [null for null in hypothesis.nulls if null.family is not family]
     turned = products(problem, hypothesis.null.views, hypothesis.fit.rest + moved)
     return np.asarray(np.max([null.likelihood_of(turned) for null in others], axis=0))
 
