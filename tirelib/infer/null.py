@@ -159,9 +159,12 @@ class Null:
         """The likeliest size of what this tire shows over what its family shows."""
         return float(self._weighed[int(np.argmax(self._levels))][1])
 
-    def about(self, views: Sequence[View]) -> "Null":
-        """Return the same test of other normal equations."""
-        return Null(views, self.family, self.allowed)
+    def about(self, views: Sequence[View], size: float | None = None) -> "Null":
+        """Return the same test of other normal equations, at one size of what the tire shows."""
+        other = Null(views, self.family, self.allowed)
+        if size is not None:
+            other._weighed = [each for each in other._weighed if each[1] == size]
+        return other
 
     def scores_of(self, products: Products, given: str = "") -> FloatArray:
         """Return the standard scores of k residuals, (n_names, k).

@@ -227,7 +227,7 @@ def gains(
     }
     for times in (*PLAN_REPEATS, ENDLESS):
         again = nothing.fit.view(problem.repeated(min(times, MANY)), view.own)
-        null = nothing.null.about([again])
+        null = nothing.null.about([again], nothing.null.size)
         for rival in test.trial.rivals:
             if rival.name != NOTHING:
                 effect = hypotheses.effects[rival.name]

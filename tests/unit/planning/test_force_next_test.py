@@ -68,7 +68,9 @@ def test_pressure_that_was_visited_in_order_is_never_taken_for_wear() -> None:
 
 
 def test_what_serves_as_well_is_indistinguishable_and_the_test_is_told() -> None:
-    found = told("pressure", 0.06)
+    # a drift so small that these runs do not tell it from the pressure: a larger one is named
+    found = assess_forces(case("wear", 0.05, seed=2), BRUSH)
+    assert assess_forces(case("wear", 0.08, seed=2), BRUSH).named == ("friction_drift",)
     assert found.verdict == "indistinguishable"
     assert set(PAIR) <= set(found.named)
     document = force_diagnosis_document(found)
