@@ -15,6 +15,7 @@ import os
 import time
 import tty
 from contextlib import suppress
+from multiprocessing.queues import Queue
 from pathlib import Path
 
 from bench_recording import READ, pieces, write
@@ -35,7 +36,9 @@ from tirelib.threads import one_thread
 FIFO = 16 * 1024
 
 
-def send(master: int, reads: list[bytes], seconds: float, results: object) -> None:
+def send(
+    master: int, reads: list[bytes], seconds: float, results: "Queue[tuple[int, int]]"
+) -> None:
     """Write at the pace of the wheels; count what the buffer did not hold."""
     with suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(20))
@@ -59,7 +62,7 @@ def send(master: int, reads: list[bytes], seconds: float, results: object) -> No
             while fifo:
                 del fifo[: os.write(master, fifo[:4096])]
         time.sleep(2e-4)
-    results.put((sent, lost))  # type: ignore[attr-defined]
+    results.put((sent, lost))
 
 
 def hog() -> None:

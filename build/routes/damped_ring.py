@@ -2,7 +2,7 @@ r"""The rolling ring with damping by one of two laws, and its waveform.
 
 "modal"     c_n = 2 lambda sqrt(m_n k_n), Eq. (107): every harmonic has the same ratio, which gives
             the belt's bending as much as the sidewall's.
-"sidewall"  c_u = 2 lambda sqrt(k_u rhoA), c_v likewise with k_v: dashpots beside the springs.
+"sidewall"  Dashpots stand beside the springs: c_u = 2 lambda sqrt(k_u rhoA), c_v the same with k_v.
 
 They are different tires: c_n of the second is (c_v + n^2 c_u), that of the first grows with
 n sqrt(k_n), and for the same shift lambda of the first is several times smaller. A ratio is only
@@ -96,12 +96,13 @@ def damped_waveform(
     Parameters
     ----------
     values : mapping
-        Of a tire; one value per point is allowed.
+        The tire's constants; each may have one value per point.
     points : Operating
     damping, law
-        As for `damped_compliance`.
+        The damping ratio and its law, as `damped_compliance` takes them.
     sheared : bool
-        With the tread's shear, rolling without torque; else through radial springs alone.
+        Whether the tread carries shear, the tire rolling without torque; otherwise the tread is
+        radial springs alone.
     """
     state = State.of(values, points, GRID)
     ring = damped_compliance(state.ring, points.omega, damping, law)

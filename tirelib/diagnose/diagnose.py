@@ -197,7 +197,7 @@ def findings_of(
     ----------
     verdict : Verdict
     problem : Problem
-        Of the verdict's hypotheses.
+        The problem that the verdict's hypotheses are about.
     rest : shape (...)
         What the model without further effects leaves, measured less model.
     white_of : callable

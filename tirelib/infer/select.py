@@ -5,9 +5,11 @@ further effect, more of each group of smooth shapes than plain tires have, and l
 off than laws are. Its p-value is the rank of the largest standard score (`tirelib.infer.null`)
 among plain tires with the hypothesis planted in the user's plan: for each family of tires by
 itself; the largest p over the families counts, so that a tire that is like any one of them is
-covered. Every hypothesis with p > alpha is in the set. Its smallest members are what the data say
-(Ferrari and Yang 2015): none in it, nothing is missing; one smallest member, that is what is
-missing; several, they cannot be told apart; none at all, something unknown is there.
+covered. A hypothesis is rejected as well where a rival of as many effects explains the runs much
+better (`tirelib.infer.rival`). Every hypothesis with p > alpha is in the set. Its smallest members
+are what the data say (Ferrari and Yang 2015): none in it, nothing is missing; one smallest member,
+that is what is missing; several, they cannot be told apart; none at all, something unknown is
+there.
 """
 
 from collections.abc import Callable, Sequence

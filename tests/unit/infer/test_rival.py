@@ -52,7 +52,7 @@ def test_an_exact_law_puts_a_vague_one_that_covers_it_out_of_the_set() -> None:
     assert found.sets == (("bend",),)
     covered = found.hypotheses.at(["twist"])
     assert covered is not None
-    # nothing stands out beside the vague law: only its rival puts it out of the set
+    # the vague law passes the test by itself; only the likelihood ratio of its rival rejects it
     assert covered.p_of(covered.statistic)[0] > 0.05
     assert covered.rival == "bend"
     assert covered.p == covered.p_rival <= 0.05
