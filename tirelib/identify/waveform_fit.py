@@ -35,6 +35,10 @@ FOLLOWED = 25
 LEAST_FALL = 1e-3
 """Fall of the cost below which a step is the last: the bottom may have an edge, where an
 integration node of the contact meets its end."""
+IDLE, LITTLE = 4, 0.1
+"""Steps in a row that lower the cost by less than `LITTLE`, in units of a chi-square, after which a
+fit has settled whatever a slope promises: at the edge of a sliding tread a slope holds on one side
+only, and a fit goes on along the edge for ever."""
 LARGEST_DAMPING = 1e8
 PROBE = 2.0
 """Distance along a ridge at which the surface is compared with its parabola, in deviations."""
@@ -164,6 +168,7 @@ class Solver:
         self.z = np.zeros(len(free))
         self.delay = 0.0
         self.damping = 1e-3
+        self.idle = 0
         self.slopes: SolutionSlopes | None = None
         self.model = self.at(self.z)
 
@@ -238,7 +243,8 @@ class Solver:
             if fall >= 0.0:
                 self.z, self.model = self.z + dz, model
                 self.damping = max(self.damping / 10.0, 1e-9)
-                return far if fall > LEAST_FALL else 0.0
+                self.idle = self.idle + 1 if fall < LITTLE else 0
+                return far if fall > LEAST_FALL and self.idle < IDLE else 0.0
             self.damping *= 10.0
         if refused is not None:
             raise refused
