@@ -101,3 +101,9 @@ void tirelib_state_save(const Wheel *wheel, unsigned char *bytes) { state_save(w
 int tirelib_state_restore(Wheel *wheel, const unsigned char *bytes, size_t n) {
     return state_restore(wheel, bytes, n);
 }
+
+#ifndef SOURCE
+#define SOURCE "unknown"
+#endif
+/* The hash of all sources, so that a test can tell whether a binary was made from them. */
+CORE_EXPORT const char tirelib_core_source[] = "source sha256 " SOURCE;

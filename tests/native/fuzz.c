@@ -12,7 +12,7 @@
 
 #include "../../fmu_src/core/state.h"
 #include "../../fmu_src/fmi2/fmi2.h"
-#include "../../fmu_src/fmi2/resources.h"
+#include "../../fmu_src/slave/resources.h"
 
 fmi2Component fmi2Instantiate(fmi2String, fmi2Type, fmi2String, fmi2String,
                               const fmi2CallbackFunctions *, fmi2Boolean, fmi2Boolean);

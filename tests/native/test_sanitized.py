@@ -29,7 +29,8 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if compiler is None:
         pytest.skip("no C compiler on this machine")
     out = tmp_path_factory.mktemp("fuzz") / "fuzz"
-    sources = [*SOURCE.glob("*.c"), *(SOURCE.parent / "fmi2").glob("*.c")]
+    rooms = [SOURCE, *(SOURCE.parent / room for room in ("slave", "fmi2", "fmi3"))]
+    sources = [source for room in rooms for source in room.glob("*.c")]
     flags = (*native_fmu.C99, *native_fmu.STRICT, *SANITIZERS, "-DALONE")
     command = [compiler, *flags, HERE / "fuzz.c", *sorted(sources), "-lm", "-o", out]
     subprocess.run(command, check=True)

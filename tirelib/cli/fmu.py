@@ -44,13 +44,15 @@ Examples:
   tirelib fmu build --calibration cal.toml --out X.fmu --samples-per-step 10      # 1 ms at 10 kHz
   tirelib fmu build --calibration cal.toml --out X.fmu --samples-per-step 32 --buffered
   tirelib fmu build --calibration cal.toml --out X.fmu --sealed     # to hand over
+  tirelib fmu build --calibration cal.toml --out X.fmu --fmi 3      # strain as an array, a clock
   tirelib fmu build --calibration cal.toml --out X.fmu --python     # computes in Python
 
 \b
-FMI 2.0 co-simulation, one wheel. Inside is the estimator compiled for Linux, Windows and macOS; it
-needs nothing else where it runs (with --python: CPython with numpy and scipy). The communication
-step is the samples per step divided by the sample rate. With --buffered the step is free, and the
-input `samples` gives the number of new samples in the frame; the estimates are the same.
+FMI 2.0 co-simulation (with --fmi 3: 3.0), one wheel. Inside is the estimator compiled for Linux,
+Windows and macOS; it needs nothing else where it runs (with --python: CPython, numpy and scipy).
+The communication step is the samples per step divided by the sample rate. With --buffered the step
+is free, and the input `samples` gives the number of new samples in the frame; the estimates are
+the same.
 """
 _TABLE = """\b
 Example:
@@ -136,6 +138,13 @@ fmu.add_command(virtual)
     is_flag=True,
     help="Leave out the calibration file: campaign names, statistics and a measured turn.",
 )
+@click.option(
+    "--fmi",
+    type=click.Choice(["2", "3"]),
+    default="2",
+    show_default=True,
+    help="Version of FMI.",
+)
 @click.option("--native", is_flag=True, hidden=True, expose_value=False)
 def build(
     calibration: Path,
@@ -146,6 +155,7 @@ def build(
     missing: float,
     python: bool,
     sealed: bool,
+    fmi: str,
 ) -> None:
     """Write StrainTire.fmu with a calibration inside."""
     with progress_bar("building", 3) as progress:
@@ -158,6 +168,7 @@ def build(
             missing=missing,
             python=python,
             sealed=sealed,
+            fmi=int(fmi),
             progress=progress,
         )
     loaded = read_calibration(calibration)

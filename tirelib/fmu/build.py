@@ -27,9 +27,10 @@ def build_fmu(
     missing: float = math.nan,
     python: bool = False,
     sealed: bool = False,
+    fmi: int = 2,
     progress: Callable[[str], None] | None = None,
 ) -> Path:
-    """Write ``StrainTire.fmu``: an FMI 2.0 co-simulation unit that estimates with a calibration.
+    """Write ``StrainTire.fmu``: a co-simulation unit that estimates with a calibration.
 
     Parameters
     ----------
@@ -52,13 +53,15 @@ def build_fmu(
         Whether the FMU leaves out the calibration file (names and statistics of the campaigns, a
         measured turn): the core's table of numbers is inside only. Its reference signals are made
         up then.
+    fmi : int
+        Version of FMI: 2, or 3 with arrays and a clock.
     progress : callable, optional
         Called with what was done.
 
     Raises
     ------
     ParameterError
-        If a number is out of range, or a Python FMU shall be sealed.
+        If a number is out of range, or a Python FMU shall be sealed or of FMI 3.0.
     FormatError
         If the calibration cannot be read, or the FMU cannot be written.
     """
@@ -67,6 +70,11 @@ def build_fmu(
         raise ParameterError(
             "fmu build: --python and --sealed; only one of them is allowed, because the Python FMU "
             "reads the calibration file; leave out --python"
+        )
+    if fmi not in (2, 3) or (python and fmi == 3):
+        raise ParameterError(
+            f"fmu build: FMI {fmi}{' with --python' if python else ''}; allowed are 2, and 3 "
+            "without --python; leave one of the options out"
         )
     loaded = read_calibration(calibration)
     spec = strain_tire(
@@ -78,6 +86,7 @@ def build_fmu(
         missing=missing,
         python=python,
         sealed=sealed,
+        fmi=fmi,
     )
     return export(spec, out, progress) if python else pack(spec, loaded, out, progress)
 

@@ -280,9 +280,14 @@ def _compare(path: Path, folder: Path, document: dict[str, Any], names: list[str
 
 
 def _table(text: str) -> tuple[list[str], Any]:
+    """Return names and numbers; of a cell with several each has a column: ``name[1]`` .."""
     lines = text.splitlines()
-    head = [name.strip().strip('"') for name in lines[0].split(",")]
-    rows = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:] if line])
+    cells = [[cell.split() for cell in line.split(",")] for line in lines[1:] if line]
+    head: list[str] = []
+    for name, first in zip(lines[0].split(","), cells[0] if cells else (), strict=False):
+        plain, n = name.strip().strip('"'), len(first)
+        head += [plain] if n == 1 else [f"{plain}[{i}]" for i in range(1, n + 1)]
+    rows = np.array([[float(number) for cell in row for number in cell] for row in cells])
     return head, rows.reshape(-1, len(head))
 
 
@@ -316,7 +321,7 @@ def _differences(
         rows.append(
             {
                 "name": name,
-                "unit": document["units"].get(name, ""),
+                "unit": document["units"].get(name.partition("[")[0], ""),
                 "largest_difference": None if math.isinf(apart[worst]) else float(apart[worst]),
                 "allowed": limit,
                 "magnitude": size,

@@ -6,7 +6,7 @@ them); what differs stands in ``resources/StrainTire.core``, whose format `core_
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
@@ -16,6 +16,7 @@ from tirelib import __version__
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.core_table import flat_table
+from tirelib.fmu.describe3 import build_description, flat_names, model_description
 from tirelib.fmu.parts import Identity, check_writable, identity_of, source_file, write_fmu
 from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.variables import Variable
@@ -27,7 +28,17 @@ BINARIES = (
     "win64/StrainTire.dll",
     "darwin64/StrainTire.dylib",
 )
-"""By platform, as FMI names it."""
+"""By platform, as FMI 2.0 names it; each holds the functions of FMI 2.0 and 3.0."""
+PLATFORMS: Mapping[int, Mapping[str, Sequence[str]]] = {
+    2: {name: (name.split("/")[0],) for name in BINARIES},
+    3: {
+        BINARIES[0]: ("x86_64-linux",),
+        BINARIES[1]: ("aarch64-linux",),
+        BINARIES[2]: ("x86_64-windows",),
+        BINARIES[3]: ("x86_64-darwin", "aarch64-darwin"),
+    },
+}
+"""By version of FMI: the folders that a binary stands in."""
 
 
 def pack(
@@ -47,16 +58,20 @@ def pack(
     target = Path(out)
     check_writable(target)
     tell("described")
-    sources = core_sources()
+    sources = core_sources(spec.fmi)
     computing = {
-        f"binaries/{name}": source_file(f"binaries/{name}").read_bytes() for name in BINARIES
+        f"binaries/{folder}/{name.split('/')[1]}": source_file(f"binaries/{name}").read_bytes()
+        for name, folders in PLATFORMS[spec.fmi].items()
+        for folder in folders
     }
     computing |= {f"sources/{name}": source_file(name).read_bytes() for name in sources}
+    if spec.fmi == 3:
+        computing["sources/buildDescription.xml"] = build_description(spec.model, sources)
     identity = identity_of(spec, computing)
     core = core_file(
         calibration,
         guid=identity.guid,
-        table=spec.table,
+        table=flat_names(spec.table) if spec.fmi == 3 else spec.table,
         numbers=[
             float(spec.settings[name])
             for name in ("samples_per_step", "buffered", "sample_rate", "missing")
@@ -67,7 +82,9 @@ def pack(
         **{f"resources/{name}": data for name, data in spec.resources.items()},
         "resources/settings.json": json.dumps(dict(spec.settings), indent=1).encode(),
         "resources/StrainTire.core": core,
-        "modelDescription.xml": _description(spec, identity, sources),
+        "modelDescription.xml": _description_of_3(spec, identity)
+        if spec.fmi == 3
+        else _description(spec, identity, sources),
     }
     tell("collected")
     write_fmu(files, spec, identity, target)
@@ -75,10 +92,11 @@ def pack(
     return target
 
 
-def core_sources() -> list[str]:
+def core_sources(fmi: int) -> list[str]:
     """Return the C files of the FMU, relative to ``fmu_src``, in the order of their names."""
     folder = source_file("core/wheel.c").parents[1]
-    found = (path for room in ("core", "fmi2") for path in (folder / room).glob("*.[ch]"))
+    rooms = ("core", "slave", f"fmi{fmi}")
+    found = (path for room in rooms for path in (folder / room).glob("*.[ch]"))
     return sorted(path.relative_to(folder).as_posix() for path in found)
 
 
@@ -115,6 +133,18 @@ def core_file(
     lines += [f"{v.kind[0]}{v.causality[0]}{v.name}" for v in table]
     values = np.concatenate((np.array(numbers, dtype=np.float64), flat_table(calibration)))
     return "\n".join((*lines, "")).encode() + values.astype("<f8").tobytes()
+
+
+def _description_of_3(spec: SlaveSpec, identity: Identity) -> bytes:
+    return model_description(
+        spec.table,
+        model=spec.model,
+        description=spec.description,
+        token=identity.guid,
+        version=identity.version,
+        step_size=spec.step_size,
+        known=spec.start_depends_on or (),
+    )
 
 
 def _description(spec: SlaveSpec, identity: Identity, sources: Sequence[str]) -> bytes:

@@ -70,7 +70,7 @@ def write_fmu(
     Parameters
     ----------
     files : mapping of str to bytes
-        ``modelDescription.xml``, and all that the FMU runs with.
+        ``modelDescription.xml``, that of FMI 3.0 complete, and all that the FMU runs with.
     packages : iterable of str, optional
         Installed packages that are inside, whose licences are added.
 
@@ -79,13 +79,11 @@ def write_fmu(
     FormatError
         If the FMU cannot be written.
     """
-    brought = {
-        "modelDescription.xml": described(
+    brought = {"model.png": spec.icon, **_licenses(packages)}
+    if spec.fmi == 2:
+        brought["modelDescription.xml"] = described(
             files["modelDescription.xml"], spec.table, spec.start_depends_on
-        ),
-        "model.png": spec.icon,
-        **_licenses(packages),
-    }
+        )
     for name, data in spec.documentation.items():
         brought[f"documentation/{name}"] = data.replace(b"{version}", identity.version.encode())
     try:

@@ -7,7 +7,7 @@ step that begins at its time; a row of the output is what is read at its time.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,9 +25,9 @@ class Reference:
     Attributes
     ----------
     step : float, [s]
-    given : dict of arrays, shape (n,)
+    given : dict of arrays, shape (n,) or (n, k)
         Inputs by name; Booleans as 0 and 1.
-    expected : dict of arrays, shape (n,)
+    expected : dict of arrays, shape (n,) or (n, k)
         Outputs by name.
     tolerance : float
     """
@@ -37,9 +37,24 @@ class Reference:
     expected: Mapping[str, FloatArray]
     tolerance: float = TOLERANCE
 
+    def joined(self, names: Sequence[str]) -> "Reference":
+        """Return the signals with numbered ones (``strain_1``, ``strain_2``) joined to arrays."""
+
+        def arrays(signals: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+            found: dict[str, list[FloatArray]] = {}
+            for name, values in signals.items():
+                stem = name.rstrip("_0123456789")
+                found.setdefault(stem if stem in names else name, []).append(values)
+            return {
+                name: np.stack(parts, axis=1) if name in names else parts[0]
+                for name, parts in found.items()
+            }
+
+        return replace(self, given=arrays(self.given), expected=arrays(self.expected))
+
     def files(self, model: str) -> dict[str, bytes]:
         """Return the three files by name."""
-        n = next(iter(self.given.values())).size
+        n = len(next(iter(self.given.values())))
         times: FloatArray = np.arange(n) * np.float64(self.step)
         options = (
             f"StartTime, 0\nStopTime, {float(times[-1])!r}\nStepSize, {self.step!r}\n"
@@ -58,8 +73,10 @@ def _csv(columns: Mapping[str, FloatArray]) -> bytes:
     return "\n".join((head, *rows, "")).encode()
 
 
-def _text(value: float) -> str:
-    """Return the shortest text that reads back as the same number."""
+def _text(value: FloatArray | float) -> str:
+    """Return the shortest text that reads back as the same number; several part at spaces."""
+    if isinstance(value, np.ndarray):
+        return " ".join(map(_text, value.tolist()))
     number = float(value)
     return str(int(number)) if math.isfinite(number) and number == int(number) else repr(number)
 

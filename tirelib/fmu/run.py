@@ -72,6 +72,11 @@ class LoadedFmu:
             description = read_model_description(str(path))
         except Exception as error:  # FMPy raises bare exceptions
             raise FormatError(f"{path}: is not an FMU ({error}); build it again") from None
+        if not description.fmiVersion.startswith("2"):
+            raise FormatError(
+                f"{path}: is an FMU of FMI {description.fmiVersion}; this command steps FMI 2.0; "
+                "build it without --fmi 3, or check it with `tirelib fmu check`"
+            )
         self.references = {v.name: v.valueReference for v in description.modelVariables}
         strains = [name for name in self.references if name.startswith("strain_")]
         self.samples = len(strains) // len(self.calibration.lateral)

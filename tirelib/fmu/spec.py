@@ -33,6 +33,8 @@ class SlaveSpec:
         PNG shown by tools.
     start_depends_on : sequence of str, optional
         Names of the variables that the outputs at the start depend on; None: maybe all.
+    fmi : int
+        Version of FMI, 2 or 3.
     """
 
     model: str
@@ -45,3 +47,4 @@ class SlaveSpec:
     documentation: Mapping[str, bytes] = field(repr=False)
     icon: bytes = field(repr=False)
     start_depends_on: Sequence[str] | None = None
+    fmi: int = 2

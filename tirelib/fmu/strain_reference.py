@@ -53,16 +53,26 @@ class _Scene:
 
 
 def strain_reference(
-    calibration: Calibration, rate: float, samples: int, *, buffered: bool = False
+    calibration: Calibration,
+    rate: float,
+    samples: int,
+    *,
+    buffered: bool = False,
+    lose: bool = True,
 ) -> Reference:
-    """Return input and expected output of an FMU with these properties."""
+    """Return input and expected output of an FMU with these properties.
+
+    `lose` makes the two lost samples NaN. Arrays cannot have them: importers interpolate those
+    (FMPy), and zero times NaN loses the next sample too.
+    """
     turn = calibration.reference
     scene = _made_up(calibration, rate) if turn is None else _measured(turn, rate)
     strain = _strain(scene, rate, TURNS)
     still = int(STILL * 2.0 * math.pi / scene.omega * rate)
     strain = np.concatenate((strain, np.repeat(strain[:, -1:], still, axis=1)), axis=1)
     period = int(2.0 * math.pi / scene.omega * rate)
-    strain[:, int(2.6 * period) : int(2.6 * period) + 2] = np.nan
+    if lose:
+        strain[:, int(2.6 * period) : int(2.6 * period) + 2] = np.nan
     counts = _counts(strain.shape[1], samples, buffered)
     firsts = np.concatenate(([0], np.cumsum(counts)))
     step = samples / rate

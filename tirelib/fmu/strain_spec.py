@@ -9,6 +9,7 @@ from typing import Any
 from tirelib.errors import ParameterError
 from tirelib.estimators.calibration import Calibration
 from tirelib.flags import INVALIDATING, TurnFlag
+from tirelib.fmu.describe3 import CLOCK, JOINED, joined
 from tirelib.fmu.handbook import html_table, page
 from tirelib.fmu.parts import source_file
 from tirelib.fmu.reference import FOLDER
@@ -42,6 +43,7 @@ def strain_tire(
     missing: float = math.nan,
     python: bool = False,
     sealed: bool = False,
+    fmi: int = 2,
 ) -> SlaveSpec:
     """Return what the FMU of a calibration consists of; see `tirelib.fmu.build.build_fmu`.
 
@@ -73,8 +75,10 @@ def strain_tire(
         *inputs(loaded.lateral, samples_per_step, buffered=buffered, road=loaded.chains[-1].road),
         *outputs(loaded.lateral),
     ]
-    shown = replace(loaded, reference=None) if sealed else loaded
-    reference = strain_reference(shown, sample_rate, samples_per_step, buffered=buffered)
+    told = replace(loaded, reference=None) if sealed else loaded
+    reference = strain_reference(
+        told, sample_rate, samples_per_step, buffered=buffered, lose=fmi == 2
+    )
     document = tomllib.loads(text)
     if sealed:
         document.pop("data", None)
@@ -85,7 +89,10 @@ def strain_tire(
         "missing": str(missing),
         "python": python,
         "sealed": sealed,
+        "fmi": fmi,
     }
+    signals = reference.joined(JOINED) if fmi == 3 else reference
+    shown = [one.variable for one in joined(table)] if fmi == 3 else table
     return SlaveSpec(
         model=MODEL,
         script="strain_tire.py",
@@ -95,11 +102,12 @@ def strain_tire(
         settings=settings,
         resources={
             **({} if sealed else {CALIBRATION: text.encode()}),
-            **{f"{FOLDER}/{name}": data for name, data in reference.files(MODEL).items()},
+            **{f"{FOLDER}/{name}": data for name, data in signals.files(MODEL).items()},
         },
-        documentation={"index.html": _page(loaded, document, table, settings).encode()},
+        documentation={"index.html": _page(loaded, document, shown, settings).encode()},
         icon=source_file("strain_tire.png").read_bytes(),
         start_depends_on=(MISSING,),
+        fmi=fmi,
     )
 
 
@@ -139,6 +147,7 @@ def _page(
         "Accuracy": _accuracy(document),
         "Calibrated range": _ranges(calibration),
         "Flags": _flags(),
+        **({"Arrays and events": _ARRAYS} if settings["fmi"] == 3 else {}),
         "Limits": _LIMITS.replace("</ul>", _PATHS) if python else _LIMITS,
         "Check": _CHECK,
     }
@@ -212,6 +221,10 @@ _BUFFERED = """<p>The input <code>samples</code> gives the number of new samples
 oldest first; the step may have any length, because time is counted in samples. In a step without
 samples the estimate ages, and after the time of two turns it is no longer valid. The packing of the
 samples does not change the estimates.</p>"""
+_ARRAYS = f"""<p><code>strain</code> holds a frame: a row for each sample, oldest first, a column
+for each gage (one dimension where a step brings one sample). In Event Mode the clock
+<code>{CLOCK}</code> ticks where <code>turn</code> has counted on; importers without Event Mode read
+<code>turn</code> after each step.</p>"""
 _LIMITS = """<ul> <li>An estimate is made once per turn, 20 degrees of wheel angle and half the
 filter after the trailing edge; <code>age</code> counts from there.</li> <li>The first turn after a
 start or a gap is never valid.</li> <li>Without an estimate a Real output shows the parameter

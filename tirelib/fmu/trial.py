@@ -81,8 +81,8 @@ def trial(fmu: Path, folder: Path) -> None:
 def _run(record: Record, description: Any, unpacked: Path, fmu: Path, folder: Path) -> None:
     messages: list[str] = []
 
-    def keep(_: Any, __: Any, ___: Any, ____: Any, message: bytes, *_____: Any) -> None:
-        messages.append(message.decode("utf-8", "replace"))
+    def keep(*said: Any) -> None:  # the message is the last argument in FMI 2.0 and 3.0
+        messages.append(said[-1].decode("utf-8", "replace"))
 
     common: dict[str, Any] = {
         "filename": str(unpacked),
@@ -124,19 +124,25 @@ def _run(record: Record, description: Any, unpacked: Path, fmu: Path, folder: Pa
             input=given,
             output=list(wanted),
         )
-        np.savetxt(
-            folder / "result.csv",
-            np.array(result.tolist()),
-            delimiter=",",
-            header=",".join(result.dtype.names),
-            comments="",
-        )
+        _write(folder / "result.csv", result)
         return f"{len(result) - 1} steps of {options['StepSize']:g} s with the reference input"
 
     record.content["platforms"] = sorted(supported_platforms(str(fmu)))
     if not attempt(record, "run", simulate) and messages:
         record.content["messages"] = messages[:20]
     record.write()
+
+
+def _write(file: Path, result: Any) -> None:
+    """Write a result; elements of an array are columns ``name[1]``, ``name[2]`` .."""
+    head: list[str] = []
+    columns = []
+    for name in result.dtype.names:
+        values = np.asarray(result[name], dtype=np.float64).reshape(len(result), -1)
+        several = values.shape[1] > 1
+        head += [f"{name}[{i}]" if several else name for i in range(1, values.shape[1] + 1)]
+        columns.append(values)
+    np.savetxt(file, np.hstack(columns), delimiter=",", header=",".join(head), comments="")
 
 
 def read_options(file: Path) -> Mapping[str, float]:

@@ -161,6 +161,11 @@ def _frame(path: Path, description: Any) -> tuple[int, int]:
             f"{path}: not an FMU for co-simulation; FMI 2.0 co-simulation is needed; build it with "
             "`tirelib fmu build`"
         )
+    if not description.fmiVersion.startswith("2"):
+        raise FmuError(
+            f"{path}: an FMU of FMI {description.fmiVersion}; FMI 2.0 is needed; build it with "
+            "`tirelib fmu build`, without --fmi 3"
+        )
     names = {variable.name for variable in description.modelVariables}
     found = [m for name in names if (m := _STRAIN.fullmatch(name))]
     gages = max((int(m[2]) for m in found), default=GAGES)
