@@ -12,6 +12,7 @@ from tirelib.effects.harmonics import orders, with_gain
     unit="rad",
     low=-0.03,
     high=0.03,
+    exact=True,
     source="trigger mounted off the top of the wheel; gages glued off their mark",
 )
 def angle_zero(state: State, strength: float) -> State:

@@ -78,6 +78,9 @@ class Effect:
         Fields of the conditions that must be measured, for instance side_force.
     untestable : str
         Why no campaign can ever show it; empty if one can.
+    exact : bool
+        Whether the law is a definition, such as where an angle has its zero, which no tire can
+        follow otherwise. All other laws are only roughly right.
     """
 
     name: str
@@ -92,6 +95,7 @@ class Effect:
     components: int = 1
     needs: tuple[str, ...] = ()
     untestable: str = ""
+    exact: bool = False
 
     def __post_init__(self) -> None:
         faults = []
@@ -251,6 +255,7 @@ def effect(
     components: int = 1,
     needs: tuple[str, ...] = (),
     untestable: str = "",
+    exact: bool = False,
 ) -> Callable[[Law], Effect]:
     """Make an effect of a law; its docstring's first line is the title.
 
@@ -279,6 +284,7 @@ def effect(
             components,
             tuple(needs),
             untestable,
+            exact,
         )
 
     return make

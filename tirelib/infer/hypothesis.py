@@ -132,7 +132,8 @@ def judged(
         How many of the fit's effects the model had already: they are part of it.
     """
     views = [fit.view(problem, own) for own in OWN]
-    usual, loose = (LAWS, (LOOSEST,)) if fit.effects else (LAWS[-1:], ())
+    rough = not all(effect.exact for effect in fit.effects)
+    usual, loose = (LAWS, (LOOSEST,)) if rough else (LAWS[-1:], ())
     levels = {law: _likelihoods(views, fit, families, law) for law in usual}
     likelihood = max(max(each) for each in levels.values())
     laws = sorted(usual, key=lambda law: -max(levels[law]))
@@ -247,7 +248,7 @@ def products(problem: Problem, views: Sequence[View], tires: FloatArray) -> Prod
 
 def law_errors(fit: Posterior, law: float) -> dict[str, float | FloatArray]:
     """Return variances of the blocks of laws that are off by a relative standard deviation."""
-    return {ROUGHLY + name: law**2 for name in fit.names}
+    return {ROUGHLY + effect.name: law**2 for effect in fit.effects if not effect.exact}
 
 
 def plausible(fit: Posterior, own_effects: int) -> bool:

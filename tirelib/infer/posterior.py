@@ -293,7 +293,8 @@ def explaining(
         first += effect.components
     ranges = [s / e.scale for e, s in zip(own, point.strengths, strict=False)]
     for effect, errors in zip(own, problem.roughly(own, rows, ranges), strict=True):
-        every[ROUGHLY + effect.name] = errors
+        if not effect.exact:
+            every[ROUGHLY + effect.name] = errors
     return every, slopes
 
 

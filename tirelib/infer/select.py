@@ -182,19 +182,20 @@ class Hypotheses:
         except TirelibError:
             return None
 
-    def needless(self, hypothesis: Hypothesis) -> bool:
-        """Return whether some of a hypothesis' effects, their laws off, explain the runs as well.
+    def simpler(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """Return the likeliest hypothesis of fewer of its effects that is at least as likely.
 
-        Then a law is not right; that more effects cover what it leaves does not show that they are
-        there.
+        Where there is one, a law of its is not right: that more effects cover what it leaves does
+        not show that they are there.
         """
-        return any(
-            h.plausible
-            and np.isfinite(h.looseness)
+        fewer = (
+            h
+            for h in self.tried
+            if h.plausible
             and set(h.names) < set(hypothesis.names)
             and h.likelihood >= hypothesis.likelihood
-            for h in self.tried
         )
+        return max(fewer, key=lambda h: h.likelihood, default=None)
 
     def added(self, hypothesis: Hypothesis) -> tuple[str, ...]:
         """Return the names of a hypothesis' further effects."""
@@ -272,11 +273,13 @@ def select(
         rivals = [h for h in every if np.isfinite(h.looseness)]
         fitted = [hypotheses.against(h, rivals[0]) if rivals else h for h in every if h.plausible]
         staying = [h for h in fitted if h.p > alpha]
-        members = [h for h in staying if not hypotheses.needless(h)]
-        if staying and not members:
-            break
+        simpler = {h: hypotheses.simpler(h) for h in staying}
+        members = [h for h in staying if simpler[h] is None]
         if members:
             return done("named" if len(members) == 1 else "indistinguishable", members)
+        if staying:
+            likeliest = max(filter(None, simpler.values()), key=lambda h: h.likelihood)
+            return done("form_inadequate", [likeliest])
         leaders = fitted[: LEADERS if size == 1 else 1]
     leader = leaders[0] if leaders else None
     while many and leader is not None and leader.plausible and not np.isfinite(leader.looseness):

@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from tirelib.arrays import FloatArray
+from tirelib.contact.free_boundary import Start
 from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.model.base import Coordinate, smoothed
 from tirelib.model.chain import (
@@ -28,7 +29,7 @@ from tirelib.model.chain import (
     strained,
 )
 from tirelib.model.rolled import STEP, Made, RolledSlopes, made_of, rolled_slopes
-from tirelib.model.state import Operating, State
+from tirelib.model.state import READ, Operating, State
 from tirelib.rolling.assemble import Unknowns
 from tirelib.rolling.constants import STIFFEST, Constants
 from tirelib.rolling.gage import Gage
@@ -216,12 +217,23 @@ def added_by_values(found: Solution, free: Sequence[Coordinate], step: float) ->
     if found.linear is None:
         return np.zeros((len(free), 1, 1))
     own, linear = _split(found.values, found.points, found.changes)
-    here, rows = _here(found, own, linear)[1], []
-    for coordinate in free:
-        value = np.asarray(found.values[coordinate.name], dtype=float)
-        moved = {**found.values, coordinate.name: coordinate.moved(value, step)}
-        rows.append((_added(found, moved, found.points, own, linear) - here) / step)
-    return _through_gage(found, np.stack(rows))
+    plain, here = _here(found, own, linear)
+    n, rows = len(found.points), np.zeros((len(free), *here.shape))
+    known = [k for k, coordinate in enumerate(free) if coordinate.name in READ]
+    # all moves at once: every point stands there once for each coordinate
+    wide = {name: np.broadcast_to(v, (len(known), n)) for name, v in found.values.items()}
+    for row, k in enumerate(known):
+        moved = wide[free[k].name].copy()
+        moved[row] = free[k].moved(moved[row], step)
+        wide[free[k].name] = moved
+    values = {name: each.ravel() for name, each in wide.items()}
+    points = found.points.take(np.tile(np.arange(n), len(known)))
+    assert plain.contact is not None  # noqa: S101 - a pressed state has it
+    start = plain.contact.start.tiled(len(known))
+    moved_ring = _plain(values, points, own, found.phi, start)
+    there = _added(found, values, points, own, linear, moved_ring)
+    rows[known] = (there.reshape(len(known), *here.shape) - here) / step
+    return _through_gage(found, rows)
 
 
 def slopes_of(found: Solution, free: Sequence[Coordinate] = ()) -> SolutionSlopes:
@@ -281,10 +293,16 @@ def _damped(values: Values) -> bool:
     return bool(np.any(values["damping"]))
 
 
-def _plain(values: Values, points: Operating, own: Sequence[Change], phi: FloatArray) -> State:
+def _plain(
+    values: Values,
+    points: Operating,
+    own: Sequence[Change],
+    phi: FloatArray,
+    start: Start | None = None,
+) -> State:
     """Return the linear ring as the rolling one is: undamped, with the same constants."""
-    still = {**values, "damping": 0.0}
-    return pressed(State.of(still, points, phi), [("constants", change) for change in own])
+    state = State.of({**values, "damping": 0.0}, points, phi).but(start=start)
+    return pressed(state, [("constants", change) for change in own])
 
 
 def _here(found: Solution, own: Sequence[Change], linear: Changes) -> tuple[State, FloatArray]:

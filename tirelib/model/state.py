@@ -62,6 +62,18 @@ class Operating:
         return Operating(*[getattr(self, name)[index] for name in self.__slots__])
 
 
+READ = frozenset(
+    {
+        *("pressure", "ring_radius", "free_radius", "belt_width", "tread_thickness"),
+        *("innerliner_offset", "bending_stiffness", "mass", "radial_stiffness"),
+        *("radial_pressure_slope", "tangential_stiffness", "tangential_pressure_slope", "damping"),
+        *("extension_stiffness", "shear_stiffness", "rotary_inertia", "tread_stiffness"),
+        "tread_hardening",
+    }
+)
+"""Values of a tire that a state reads: the linear ring and its contact know no others."""
+
+
 @dataclass(frozen=True, slots=True)
 class State:
     """Operating points with the model's constants there, and what has been computed so far.

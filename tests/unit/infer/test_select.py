@@ -1,13 +1,18 @@
 """The confidence set on a linear problem whose truth is known."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from tests.unit.infer.linear_problem import N, Toy, drawn, family
+from tests.unit.infer.linear_problem import SHAPES, N, Toy, drawn, family
+from tirelib.arrays import FloatArray
+from tirelib.effects import Effect
 from tirelib.errors import ParameterError
-from tirelib.infer.hypothesis import judged
-from tirelib.infer.posterior import posterior
-from tirelib.infer.select import select
+from tirelib.infer.hypothesis import Hypothesis, judged
+from tirelib.infer.posterior import Posterior, posterior
+from tirelib.infer.select import Hypotheses, select
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 
@@ -106,3 +111,52 @@ def test_samples_with_more_misfit_of_their_own_hide_nothing() -> None:
         for _ in range(12)
     ]
     assert sum(kind != "none" for kind in kinds) <= 2  # 98 % bound of 5 %
+
+
+class Rough(Toy):
+    """A strong law that is off in the shapes of which plain tires show least."""
+
+    OFF = 0.08
+
+    def __init__(self, measured: FloatArray, *, exact: bool) -> None:
+        super().__init__(measured)
+        self.by["bend"] = 10.0 * self.by["bend"]
+        size = np.linalg.norm(self.by["bend"]) / np.linalg.norm(self.there)
+        self.ways = size * self.there
+        self.living = tuple(replace(effect, exact=exact) for effect in self.living)
+
+    def roughly(
+        self, effects: Sequence[Effect], rows: Sequence[FloatArray], ranges: Sequence[FloatArray]
+    ) -> list[FloatArray]:
+        return [np.linalg.norm(size) * self.ways for size in ranges]
+
+
+def test_a_law_that_is_a_definition_has_no_error() -> None:
+    named = {}
+    for exact in (False, True):
+        random = np.random.default_rng(32)
+        toy = Rough(drawn(random), exact=exact)
+        off = Rough.OFF * random.standard_normal(SHAPES) @ toy.ways
+        toy.measured = toy.measured + 0.8 * (toy.by["bend"][0] + off)
+        named[exact] = select(toy, FAMILIES).sets
+    assert named[False] == (("bend",),)
+    assert named[True] == ()  # it may not be off, and nothing else explains what it leaves
+
+
+def test_more_effects_that_are_not_likelier_say_that_a_law_is_not_right(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    toy = Toy(drawn(np.random.default_rng(2), bend=0.6, twist=0.6))
+    tested = Hypotheses._tested
+
+    def dearer(self: Hypotheses, fit: Posterior) -> Hypothesis:
+        """Return a pair as a hypothesis that explains all, but is less likely than one effect."""
+        h = tested(self, fit)
+        return replace(h, likelihood=h.likelihood - 1e4) if len(fit.effects) > 1 else h
+
+    monkeypatch.setattr(Hypotheses, "_tested", dearer)
+    found = select(toy, FAMILIES)
+    assert found.kind == "form_inadequate"
+    ((name,),) = found.sets
+    one = max((h for h in found.tried if len(h.names) == 1), key=lambda h: h.likelihood)
+    assert one.names == (name,)

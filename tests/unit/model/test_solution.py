@@ -22,8 +22,9 @@ from tirelib.model.solution import (
     slopes_of,
     solved,
 )
-from tirelib.model.state import State
+from tirelib.model.state import READ, State
 from tirelib.signal import LowPass
+from tirelib.waveforms import GRID
 
 VALUES = values_of(TIRE)
 POINTS = operating(np.array([2500.0, 4500.0, 6500.0]), np.array([1.8e5, 2.1e5, 2.4e5]))
@@ -188,3 +189,15 @@ def test_a_start_along_the_slopes_is_near() -> None:
 def test_directions_that_move_no_ring_have_no_deflection() -> None:
     with pytest.raises(ParameterError, match="none of their directions"):
         _ = SolutionSlopes(np.zeros((1, 3, 360)), None).deflection
+
+
+def test_a_state_reads_the_values_it_says() -> None:
+    read = set()
+
+    class Watched(dict[str, float]):
+        def __getitem__(self, name: str) -> float:
+            read.add(name)
+            return super().__getitem__(name)
+
+    State.of(Watched(VALUES), POINTS, GRID)
+    assert read == READ
