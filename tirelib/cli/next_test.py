@@ -136,7 +136,8 @@ def next_test(
     from tirelib.diagnose.document import assess, diagnosis_document
     from tirelib.identify.campaign_data import straight_runs
     from tirelib.infer.select import Hypotheses
-    from tirelib.infer.strain import StrainProblem, in_base
+    from tirelib.infer.strain import StrainProblem
+    from tirelib.infer.strain_living import in_base
     from tirelib.model.registration import registered_effects
     from tirelib.parameters import read_tire
     from tirelib.planning.document import plan_document, plan_test

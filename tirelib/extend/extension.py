@@ -18,7 +18,8 @@ from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.extend.step import Step, added, removed
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.select import Hypotheses
-from tirelib.infer.strain import StrainProblem, in_base
+from tirelib.infer.strain import StrainProblem
+from tirelib.infer.strain_living import in_base
 from tirelib.threads import one_thread
 
 

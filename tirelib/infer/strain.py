@@ -13,18 +13,12 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.effects import Effect
-from tirelib.errors import ParameterError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.delay import STD, UNIT, by_delay, earlier
-from tirelib.identify.discrepancy import (
-    REFERENCE_LOAD,
-    REFERENCE_OMEGA,
-    REFERENCE_PRESSURE,
-    Discrepancy,
-    bumps,
-)
 from tirelib.identify.random_effects import scales, tangents
 from tirelib.infer.problem import Point
+from tirelib.infer.strain_laws import SHAPES, as_large, law_errors
+from tirelib.infer.strain_living import in_base, living
 from tirelib.infer.whiten import INSIDE, Whitener
 from tirelib.model import solution
 from tirelib.model.base import coordinates, move
@@ -62,19 +56,8 @@ WIDTH = {
     "tread_spread": 1.3,
 }
 """Prior standard deviations of the base's coordinates: wide, the campaign informs them."""
-IN_BASE = {
-    "belt_extension": "extension_stiffness",
-    "belt_shear": "shear_stiffness",
-    "rotary_inertia": "rotary_inertia",
-}
-"""Effects that the base may have as a number."""
-STILL = {"slip_angle": 5e-3, "camber": 5e-3, "slip_ratio": 5e-3}
-"""What straight free rolling lacks, and the least that counts, [rad], [rad], [-]."""
-SHAPES = Discrepancy(inside=1.0, outside=0.15, by_load=1.0, by_pressure=1.0, by_speed=1.0)
 OWN = 0.004
 """A run's own misfit over its rms strain, in the contact."""
-LEAST_SIGNAL = 3.0
-"""Whitened norm below which an effect at the end of its range is dead."""
 LEAST_STEP = 1e-3
 NEAR = 0.05
 """Move of a strength, in ranges, within which what it adds to the slopes is kept."""
@@ -199,7 +182,6 @@ class StrainProblem:
         self.free = coordinates(values)
         self.start = Point(np.zeros(len(self.free) + 1), tuple(effects), tuple(strengths))
         self.widths = np.array([*(WIDTH[c.name] for c in self.free), STD / UNIT])
-        self.dead: dict[str, str] = {}
         typical = float(np.sqrt(np.mean(runs.strain**2)))
         noise = runs.noise.std if runs.noise.known else UNKNOWN_NOISE * typical
         self._last: tuple[StrainSolved, SolutionSlopes] | None = None
@@ -211,7 +193,13 @@ class StrainProblem:
         self._whiteners: dict[float, Whitener] = {}
         solved = self._solved(self.start, None)
         self.reference = self._referred(solved)
-        self.living = self._alive(solved, catalogue)
+        has = {effect.name for effect in effects} | in_base(values)
+
+        def signal(effect: Effect) -> float:
+            return float(np.linalg.norm(self.whitener(OWN)(self.signature(solved, effect))))
+
+        further = [effect for effect in catalogue if effect.name not in has]
+        self.living, self.dead = living(further, self.data.points, signal)
 
     @property
     def half_angle(self) -> FloatArray:
@@ -432,106 +420,8 @@ class StrainProblem:
     ) -> Sequence[FloatArray]:
         """Return how what effects do would look if their laws were roughly right."""
         each = zip(rows, ranges, strict=True)
-        return [self._roughly(_as_large(own, size)) for own, size in each]
-
-    def _roughly(self, rows: FloatArray) -> FloatArray:
-        """Return how rows would look if their law were roughly right.
-
-        Each goes otherwise with load, pressure, speed and time; acts a little further ahead or
-        behind, and more or less sharply; and smooth shapes over the wheel angle, as large as the
-        rows are in that run, are added, constant or going with load or speed.
-        """
-        p = self.data.points
-        conditions = np.stack(
-            [
-                np.log(p.load / REFERENCE_LOAD),
-                (p.omega / REFERENCE_OMEGA) ** 2,
-                4.0 * (p.pressure / REFERENCE_PRESSURE - 1.0),
-                2.0 * p.order - 1.0,
-            ]
-        )
-        present = conditions[:, : self.present]
-        conditions = conditions - present.mean(axis=1, keepdims=True)
-        otherwise = (conditions[:, None, :, None] * rows[None]).reshape(-1, *rows.shape[1:])
-        square = np.sum(rows**2, axis=0)
-        size = np.sqrt(0.5 * np.mean(square, axis=1, keepdims=True) + 0.5 * self._nearby(square))
-        shape = bumps(GRID / self.half_angle[:, None], SHAPES.knots, SHAPES.reach) * size
-        shape = shape - shape.mean(axis=2, keepdims=True)
-        going = [shape * factor[:, None] for factor in conditions[:2]]
-        return np.concatenate([otherwise, *self._elsewhere(rows), shape, *going])
-
-    def _elsewhere(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return how rows change as they move by half a contact, and as they blur by as much.
-
-        The terms of first and second order of a Taylor series in the half contact angle.
-        """
-        order = np.fft.rfftfreq(GRID.size, 1.0 / GRID.size)
-        slope = 1j * self.half_angle[:, None] * order
-        waves = np.fft.rfft(rows)
-        moved, blurred = (np.fft.irfft(by * waves, n=GRID.size) for by in (slope, slope**2 / 2.0))
-        return moved, blurred
-
-    def _nearby(self, square: FloatArray) -> FloatArray:
-        """Return squares (n_runs, n_phi) averaged over about half a contact's length."""
-        order = np.fft.rfftfreq(GRID.size, 1.0 / GRID.size)
-        gain = np.exp(-0.5 * (self.half_angle[:, None] * order) ** 2)
-        return np.asarray(np.maximum(np.fft.irfft(np.fft.rfft(square) * gain, n=GRID.size), 0.0))
-
-    def _alive(self, solved: StrainSolved, catalogue: Sequence[Effect]) -> tuple[Effect, ...]:
-        """Return the effects that this plan may show; the others go to `dead`, with the reason."""
-        has = {effect.name for effect in self.start.effects} | in_base(self.values)
-        living = []
-        for effect in catalogue:
-            if effect.hook == "brush" or effect.name in has:
-                continue
-            reason = effect.untestable or self._idle(effect)
-            if not reason:
-                try:
-                    rows = self.whitener(OWN)(self.signature(solved, effect))
-                    signal = float(np.linalg.norm(rows))
-                    if signal < LEAST_SIGNAL:
-                        reason = "changes nothing that this plan could show" + (
-                            f" (it varies with {', '.join(effect.varies_with)})"
-                            if effect.varies_with
-                            else ""
-                        )
-                except ParameterError as error:
-                    reason = str(error)
-            if reason:
-                self.dead[effect.name] = reason
-            else:
-                living.append(effect)
-        return tuple(living)
-
-    def _idle(self, effect: Effect) -> str:
-        """Return which condition that an effect varies with no run has, or is not measured."""
-        points = self.data.points
-        still = [
-            name
-            for name, least in STILL.items()
-            if name in effect.varies_with
-            and float(np.abs(np.nan_to_num(getattr(points, name))).max()) < least
-        ]
-        if still:
-            return f"no run has a {' or '.join(still).replace('_', ' ')}"
-        missing = effect.unknown(points)
-        return f"{', '.join(missing)} is not measured in every run" if missing else ""
-
-
-def in_base(values: Mapping[str, float | FloatArray]) -> set[str]:
-    """Return the effects that a tire's base model fits as numbers."""
-    numbers = {coordinate.name for coordinate in coordinates(values)}
-    return {effect for effect, number in IN_BASE.items() if number in numbers}
-
-
-def _as_large(rows: FloatArray, ranges: FloatArray) -> FloatArray:
-    """Return rows (components, ...), each as large as what all do together at these strengths.
-
-    Components may oppose each other: what is left of them is what a law can be off by.
-    """
-    together = float(np.sqrt(np.mean(np.tensordot(ranges, rows, axes=1) ** 2)))
-    own = np.sqrt(np.mean(rows**2, axis=tuple(range(1, rows.ndim)), keepdims=True))
-    return np.asarray(rows * (together / own))
+        where = self.half_angle, self.data.points, self.present
+        return [law_errors(as_large(own, size), *where) for own, size in each]
 
 
 def _with_changes(

@@ -1,0 +1,66 @@
+"""Errors of a law on strain: how large they are, where they act, and with what they go."""
+
+import numpy as np
+import pytest
+
+from tests.unit.identify.model_waves import operating
+from tirelib.infer.strain_laws import as_large, law_errors
+from tirelib.waveforms import GRID
+
+LOAD = np.array([2000.0, 4000.0, 6000.0])
+POINTS = operating(LOAD, np.full(3, 2.2e5))
+HALF = np.array([0.12, 0.16, 0.2])
+BUMP = np.exp(-0.5 * (GRID / (0.5 * HALF[:, None])) ** 2)
+
+
+def share_outside(row: np.ndarray, errors: np.ndarray) -> float:
+    """Return the share of a row that no mixture of errors makes."""
+    flat = errors.reshape(len(errors), -1).T
+    found = np.linalg.lstsq(flat, row.ravel(), rcond=1e-6)[0]
+    return float(np.linalg.norm(row.ravel() - flat @ found) / np.linalg.norm(row))
+
+
+def test_components_that_oppose_each_other_are_off_by_what_they_leave() -> None:
+    rows = np.stack([BUMP, 1.1 * BUMP])
+    scaled = as_large(rows, np.array([1.0, -1.0]))
+    left = np.sqrt(np.mean((0.1 * BUMP) ** 2))
+    assert np.sqrt(np.mean(scaled**2, axis=(1, 2))) == pytest.approx([left, left])
+
+
+def test_one_component_is_off_by_a_share_of_what_it_does() -> None:
+    assert as_large(BUMP[None], np.array([-0.3]))[0] == pytest.approx(0.3 * BUMP)
+
+
+@pytest.mark.parametrize("share", [0.05, -0.05])
+def test_an_effect_may_act_a_little_ahead(share: float) -> None:
+    errors = law_errors(BUMP[None], HALF, POINTS, 3)
+    moved = np.exp(-0.5 * ((GRID + share * HALF[:, None]) / (0.5 * HALF[:, None])) ** 2)
+    # two terms of a Taylor series in the half contact are among the errors
+    terms = errors[4:6]
+    assert moved - BUMP == pytest.approx(share * terms[0] + share**2 * terms[1], abs=1e-3)
+    assert share_outside(moved - BUMP, terms) < 0.02
+
+
+def test_an_effect_may_be_sharper() -> None:
+    errors = law_errors(BUMP[None], HALF, POINTS, 3)
+    sharper = np.exp(-0.5 * (GRID / (0.45 * HALF[:, None])) ** 2) / 0.9
+    assert share_outside(sharper - BUMP, errors) < 0.15
+    # without the two terms other shapes have to stand for it
+    assert share_outside(sharper - BUMP, errors[4:6]) < 0.3
+
+
+def test_an_effect_may_go_otherwise_with_load_about_its_mean() -> None:
+    with_load = law_errors(BUMP[None], HALF, POINTS, 3)[0]
+    factor = np.log(LOAD) - np.log(LOAD).mean()
+    assert with_load == pytest.approx(factor[:, None] * BUMP)
+
+
+def test_errors_of_runs_ahead_count_from_the_mean_of_those_that_are_measured() -> None:
+    two = law_errors(BUMP[None], HALF, POINTS, 2)[0]
+    factor = np.log(LOAD) - np.log(LOAD[:2]).mean()
+    assert two == pytest.approx(factor[:, None] * BUMP)
+
+
+def test_errors_grow_with_the_effect() -> None:
+    one, three = (law_errors(k * BUMP[None], HALF, POINTS, 3) for k in (1.0, 3.0))
+    assert three == pytest.approx(3.0 * one)

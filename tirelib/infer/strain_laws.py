@@ -1,0 +1,88 @@
+"""How what an effect does to the strain would look if its law were only roughly right."""
+
+import numpy as np
+
+from tirelib.arrays import FloatArray
+from tirelib.identify.discrepancy import (
+    REFERENCE_LOAD,
+    REFERENCE_OMEGA,
+    REFERENCE_PRESSURE,
+    Discrepancy,
+    bumps,
+)
+from tirelib.model.state import Operating
+from tirelib.waveforms import GRID
+
+SHAPES = Discrepancy(inside=1.0, outside=0.15, by_load=1.0, by_pressure=1.0, by_speed=1.0)
+"""Smooth shapes over the wheel angle."""
+
+
+def law_errors(
+    rows: FloatArray, half_angle: FloatArray, points: Operating, present: int
+) -> FloatArray:
+    """Return errors of a law, each as large as what the effect does.
+
+    The effect goes otherwise with load, pressure, speed and time; acts a little further ahead or
+    behind, and more or less sharply; and smooth shapes over the wheel angle, as large as the rows
+    are in that run, are added, constant or going with load or speed.
+
+    Parameters
+    ----------
+    rows : shape (components, n_runs, n_phi), [-]
+        What the effect does to the waveforms.
+    half_angle : shape (n_runs,), [rad]
+        Of the contact.
+    points : Operating
+    present : int
+        Runs that are measured, the first ones: conditions count from their mean.
+
+    Returns
+    -------
+    shape (n_errors, n_runs, n_phi)
+    """
+    conditions = np.stack(
+        [
+            np.log(points.load / REFERENCE_LOAD),
+            (points.omega / REFERENCE_OMEGA) ** 2,
+            4.0 * (points.pressure / REFERENCE_PRESSURE - 1.0),
+            2.0 * points.order - 1.0,
+        ]
+    )
+    conditions = conditions - conditions[:, :present].mean(axis=1, keepdims=True)
+    otherwise = (conditions[:, None, :, None] * rows[None]).reshape(-1, *rows.shape[1:])
+    square = np.sum(rows**2, axis=0)
+    mean = np.mean(square, axis=1, keepdims=True)
+    size = np.sqrt(0.5 * mean + 0.5 * _nearby(square, half_angle))
+    shape = bumps(GRID / half_angle[:, None], SHAPES.knots, SHAPES.reach) * size
+    shape = shape - shape.mean(axis=2, keepdims=True)
+    going = [shape * factor[:, None] for factor in conditions[:2]]
+    return np.concatenate([otherwise, *_elsewhere(rows, half_angle), shape, *going])
+
+
+def as_large(rows: FloatArray, ranges: FloatArray) -> FloatArray:
+    """Return rows (components, ...), each as large as what all do together at these strengths.
+
+    Components may oppose each other: what is left of them is what a law can be off by.
+    """
+    together = float(np.sqrt(np.mean(np.tensordot(ranges, rows, axes=1) ** 2)))
+    own = np.sqrt(np.mean(rows**2, axis=tuple(range(1, rows.ndim)), keepdims=True))
+    return np.asarray(rows * (together / own))
+
+
+def _elsewhere(rows: FloatArray, half_angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return how rows change as they move by half a contact, and as they blur by as much.
+
+    The terms of first and second order of a Taylor series in the half contact angle.
+    """
+    order = np.fft.rfftfreq(GRID.size, 1.0 / GRID.size)
+    slope = 1j * half_angle[:, None] * order
+    waves = np.fft.rfft(rows)
+    moved, blurred = (np.fft.irfft(by * waves, n=GRID.size) for by in (slope, slope**2 / 2.0))
+    return moved, blurred
+
+
+def _nearby(square: FloatArray, half_angle: FloatArray) -> FloatArray:
+    """Return squares (n_runs, n_phi) averaged over about half a contact's length."""
+    order = np.fft.rfftfreq(GRID.size, 1.0 / GRID.size)
+    gain = np.exp(-0.5 * (half_angle[:, None] * order) ** 2)
+    return np.asarray(np.maximum(np.fft.irfft(np.fft.rfft(square) * gain, n=GRID.size), 0.0))
