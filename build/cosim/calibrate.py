@@ -20,7 +20,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from tirelib.arrays import FloatArray
-from tirelib.cli.common import progress_bar
+from tirelib.cli.progress import progress_bar
 from tirelib.rig.campaign import TRUTH_FILE, run_plan
 from tirelib.rig.plans import Plan
 from tirelib.rig.tire import Condition, tire

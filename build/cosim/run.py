@@ -42,7 +42,7 @@ from cosim.recording import STEP, VEHICLE, Recording, build_fmus, record
 from cosim.score import COVERED, LIMITS, score, turns_of
 from cosim.wheels import WHEELS, FourWheels
 from tirelib import __version__
-from tirelib.cli.common import progress_bar
+from tirelib.cli.progress import progress_bar
 from tirelib.rig.campaign import THREADS
 from tirelib.threads import one_thread
 

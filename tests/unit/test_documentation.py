@@ -6,6 +6,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ from tests.schema_check import SCHEMAS, wrong_documents
 from tirebench.cli import program as bench
 from tirelib.cli import program
 from tirelib.flags import TurnFlag
+from tirelib.model.brush import BrushConditions, BrushState
+from tirelib.model.state import Operating, State
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -68,6 +71,16 @@ def commands(text: str) -> list[str]:
 def test_every_flag_has_a_remedy() -> None:
     tables = imported("tables", DOCS)
     assert set(tables.REMEDIES) == {flag.name for flag in TurnFlag}
+
+
+@pytest.mark.parametrize("state", [State, Operating, BrushState, BrushConditions])
+def test_what_a_law_finds_in_its_state_is_on_the_page(state: Any) -> None:
+    page = (DOCS / "howto" / "effects.md").read_text(encoding="utf-8")
+    assert [f.name for f in fields(state) if f"`{f.name}" not in page] == []
+
+
+def test_diagnosis_is_explained_in_800_words() -> None:
+    assert len((DOCS / "howto" / "diagnose.md").read_text(encoding="utf-8").split()) <= 800
 
 
 def imported(name: str, folder: Path) -> Any:

@@ -58,12 +58,13 @@ OPTIONAL = {
 
 _EXAMPLE = """\b
 Examples:
-  tirelib rig --plan set1 --out build/out/set1
-  tirelib campaign check build/out/set1
-  tirelib calibrate build/out/set1 --out build/out/cal.toml
-  tirelib estimate build/out/set1 --calibration build/out/cal.toml
-  tirelib identify build/out/straight --out build/out/M.toml
-  tirelib simulate --model build/out/M.toml --load 4000 --speed 80 --out build/out/simulated
+  tirelib rig --plan set1 --seed 1 --repeats 6 --out day1
+  tirelib rig --plan set1 --seed 2 --out day2
+  tirelib campaign check day1
+  tirelib calibrate day1 --out cal.toml
+  tirelib estimate day2 --calibration cal.toml --json estimates.json
+  tirelib rig --plan short --hide sidewall_damping=0.05 --out straight
+  tirelib explain straight --out explained
 
 \b
 Exit code: 0 done, 1 the command ran and its answer is negative, 2 bad input.

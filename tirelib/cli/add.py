@@ -12,10 +12,10 @@ from tirelib.cli.common import (
     NEW_FILE,
     NEW_FOLDER,
     output,
-    progress_bar,
     write_json,
 )
 from tirelib.cli.options import effects_option, json_option, model_option
+from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.errors import ParameterError
 from tirelib.journey import QUANTITIES
 
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 _EXAMPLE = """\b
 Examples:
-  tirelib add sidewall_damping --model M.toml --data build/out/straight --out M2.toml \\
-      --report build/out/added
-  tirelib add sidewall_damping --remove --model M2.toml --data build/out/straight --out M3.toml
+  tirelib rig --plan short --hide sidewall_damping=0.05 --out straight
+  tirelib identify straight --out M.toml
+  tirelib add sidewall_damping --model M.toml --data straight --out M2.toml --report added
+  tirelib add sidewall_damping --remove --model M2.toml --data straight --out M3.toml
   tirelib add --undo --model M2.toml --out M1.toml
-  tirelib add friction_load --model M.toml --data build/out/cornering --out M2.toml
 
 \b
 The base model and all strengths are fitted again. Held-out errors are on the highest load and the
@@ -72,6 +72,7 @@ FORMAT = "tirelib-model/1"
     "held-out errors.",
 )
 @json_option()
+@progress_options
 def add(
     effect_name: str | None,
     model_name: str,

@@ -1,5 +1,6 @@
 """``tirelib calibrate``: fit the regressions on campaigns of one tire."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -17,12 +18,12 @@ from tirelib.cli.common import (
     NEW_FILE,
     NEW_FOLDER,
     output,
-    progress_bar,
     write_json,
 )
 from tirelib.cli.features import make_low_pass
 from tirelib.cli.limits import not_checked, not_given
 from tirelib.cli.options import json_option, low_pass_options
+from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.costs import costs_of
@@ -46,9 +47,10 @@ FORMAT = "tirelib-calibrate/1"
 
 _EXAMPLE = """\b
 Examples:
-  tirelib calibrate data/cornering --out build/out/cal.toml
-  tirelib calibrate data/cornering data/speeds data/braking --out build/out/cal.toml \\
-      --report build/out/calibration
+  tirelib rig --plan set1 --seed 1 --repeats 6 --out day1
+  tirelib calibrate day1 --out cal.toml
+  tirelib rig --plan brake_drive --out braking
+  tirelib calibrate day1 braking --out cal.toml --report calibration
 
 \b
 Several campaigns must have the same tire and gages. More conditions in the data (pressure, speed,
@@ -75,6 +77,7 @@ camber, slip ratio) make the calibration hold for them.
 @click.option("--quick", is_flag=True, help="Skip the cross-validation by level.")
 @low_pass_options
 @json_option("statistics")
+@progress_options
 def calibrate(
     folders: tuple[Path, ...],
     target: Path,
@@ -125,6 +128,9 @@ def calibrate(
         rows = [vars_of(row) for row in held_out]
         page = write_calibration_report(trained, report, held_out=rows)
         console.print(f"written: {page}")
+    console.print(
+        f"next: tirelib estimate ANOTHER_DAY --calibration {target} --json estimates.json"
+    )
 
 
 def vars_of(row: HeldOut) -> dict[str, Any]:
@@ -258,24 +264,44 @@ def _provenance(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None:
-    for regression in trained.regressions:
-        table = Table(
-            title=f"{regression.name} ({regression.source}): "
-            f"R2 {100 * regression.r2:.2f} %, rmse {regression.rmse:.4g} {regression.unit}, "
-            f"held out {regression.cross_validated:.4g} {regression.unit}, "
-            f"n = {regression.measured.size}",
-            box=SIMPLE_HEAD,
-            title_justify="left",
-        )
-        for column in ("term", "coefficient", "std error", "p value"):
-            table.add_column(column, justify="left" if column == "term" else "right")
-        for term in regression.terms:
-            table.add_row(
-                term.name, f"{term.coefficient:.5g}", f"{term.std_error:.3g}", f"{term.p_value:.3f}"
-            )
-        console.print(table)
+    """Print the estimators in use first, then the dissertation's regressions beside them."""
+    console.print(_in_use_table(trained, document["in_use"]))
+    if document["held_out"]:
+        console.print(_held_out_table(document["held_out"]))
+    if trained.regressions:
+        console.print(_regression_table(trained.regressions))
     for name, reason in trained.skipped.items():
         console.print(f"not fitted: {name}: {reason}")
+
+
+def _regression_table(regressions: Sequence[Regression]) -> Table:
+    """Every regression of the dissertation with its coefficients."""
+    table = Table(
+        title="For comparison: the dissertation's regressions on the same runs (not used by "
+        "estimate)",
+        box=SIMPLE_HEAD,
+        title_justify="left",
+    )
+    for column in ("regression", "R2", "held out", "term", "coefficient", "std error", "p value"):
+        table.add_column(column, justify="left" if column in ("regression", "term") else "right")
+    for regression in regressions:
+        error = f"{regression.cross_validated:.4g} {regression.unit}"
+        first = (regression.name, f"{regression.r2:.4f}", error)
+        second = (f"  {regression.source}", "", "")
+        for number, term in enumerate(regression.terms):
+            table.add_row(
+                *((first, second)[number] if number < 2 else ("", "", "")),
+                term.name,
+                f"{term.coefficient:.5g}",
+                f"{term.std_error:.3g}",
+                f"{term.p_value:.3f}",
+                end_section=number == len(regression.terms) - 1,
+            )
+    return table
+
+
+def _in_use_table(trained: Trained, in_use: dict[str, Any]) -> Table:
+    """Error of each estimator on conditions that were held out."""
     table = Table(
         title="Error of the estimators (rms, with conditions held out)",
         box=SIMPLE_HEAD,
@@ -291,7 +317,7 @@ def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None
         "alpha": chain.angle.polynomial if chain.angle else None,
     }
     for quantity in QUANTITIES:
-        entry, model = document["in_use"][quantity], models[quantity]
+        entry, model = in_use[quantity], models[quantity]
         if entry is None or model is None:
             why = trained.links.refused.get(quantity, "")
             table.add_row(quantity, "not calibrated", "", "", "", why)
@@ -305,9 +331,7 @@ def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None
             str(entry["n"]),
             str(len(model.terms)),
         )
-    console.print(table)
-    if document["held_out"]:
-        console.print(_held_out_table(document["held_out"]))
+    return table
 
 
 def _held_out_table(rows: list[dict[str, Any]]) -> Table:

@@ -13,8 +13,9 @@ from rich.table import Table
 
 from tirelib.campaign.problem import Problem
 from tirelib.campaign.read import Campaign, read_campaign
-from tirelib.cli.common import NEW_FOLDER, progress_bar
+from tirelib.cli.common import NEW_FOLDER
 from tirelib.cli.options import json_option
+from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.errors import FormatError
 
 CHECK_FORMAT = "tirelib-campaign-check/1"
@@ -36,8 +37,9 @@ def _progress(what: str) -> Iterator[Callable[[int, int], None]]:
 
 
 _CHECK_EXAMPLE = """\b
-Example:
-  tirelib campaign check data/my-campaign --json build/out/check.json
+Examples:
+  tirelib rig --plan short --out straight
+  tirelib campaign check straight --json check.json
 
 \b
 Exit code: 0 no error (warnings are allowed), 1 errors were found,
@@ -48,6 +50,7 @@ Exit code: 0 no error (warnings are allowed), 1 errors were found,
 @campaign.command(epilog=_CHECK_EXAMPLE)
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @json_option("the problems")
+@progress_options
 @click.pass_context
 def check(context: click.Context, folder: Path, json_file: Path | None) -> None:
     """List all problems of the campaign in DIR at once."""
@@ -110,8 +113,9 @@ def check_document(folder: Path, problems: list[Problem]) -> dict[str, Any]:
 
 
 _SHOW_EXAMPLE = """\b
-Example:
-  tirelib campaign show data/my-campaign --out build/out/show-my-campaign
+Examples:
+  tirelib rig --plan short --out straight
+  tirelib campaign show straight --out shown
 """
 
 
@@ -121,9 +125,10 @@ Example:
     "--out",
     metavar="DIR",
     type=NEW_FOLDER,
-    help="Folder for the overview plot. Default: build/out/show-NAME.",
+    help="Folder for the overview plot. Default: show-NAME.",
 )
 @json_option("header and runs")
+@progress_options
 def show(folder: Path, out: Path | None, json_file: Path | None) -> None:
     """Show header, runs with set points and measured means, and an overview plot of DIR."""
     from tirelib.campaign.overview import RunRow, representative_plans, run_row
@@ -142,7 +147,7 @@ def show(folder: Path, out: Path | None, json_file: Path | None) -> None:
     console = terminal if terminal.is_terminal else Console(highlight=False, width=_WIDE)
     _print_header(console, data)
     _print_runs(console, data, rows)
-    target = out or Path("build/out") / f"show-{folder.resolve().name}"
+    target = out or Path(f"show-{folder.resolve().name}")
     picture = save_figure(overview_figure(data.header, rows, shown), target / "overview.png")
     if json_file is not None:
         _write_json(json_file, _show_document(data, rows, picture))

@@ -10,20 +10,21 @@ from tirelib.cli.common import (
     NEW_FILE,
     NEW_FOLDER,
     output,
-    progress_bar,
     write_json,
 )
 from tirelib.cli.options import effects_option, json_option, model_option, quantity_option
+from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.errors import ParameterError
 
 _EXAMPLE = """\b
 Examples:
-  tirelib rig --plan straight --out build/out/straight
-  tirelib identify build/out/straight --out build/out/M.toml
-  tirelib compare build/out/straight --model build/out/M.toml --out build/out/compared
-  tirelib compare build/out/set1 --model build/out/M.toml --quantity Fy --json build/out/Fy.json
-  tirelib compare build/out/straight --model build/out/M.toml --trace sidewall_load=0.2 \\
-      --data build/out/traces.npz
+  tirelib rig --plan short --hide sidewall_damping=0.05 --out straight
+  tirelib identify straight --out M.toml
+  tirelib compare straight --model M.toml --out compared
+  tirelib compare straight --model M.toml --trace sidewall_load=0.2 --data traces.npz
+  tirelib rig --plan set1 --out cornering
+  tirelib identify cornering --out M-forces.toml
+  tirelib compare cornering --model M-forces.toml --quantity Fy --json Fy.json
 
 \b
 DIR/index.html holds everything in one file; comparison.md and comparison.json hold the same as
@@ -61,6 +62,7 @@ measured tire had it and the model did not.
     "strength are separated by commas. May be given several times.",
 )
 @json_option()
+@progress_options
 def compare(
     folder: Path,
     model_name: str,

@@ -14,7 +14,6 @@ from tirelib.campaign import Campaign, read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
     output,
-    progress_bar,
     write_json,
 )
 from tirelib.cli.options import (
@@ -25,6 +24,7 @@ from tirelib.cli.options import (
     quantity_option,
     report_option,
 )
+from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.errors import TirelibError
 from tirelib.journey import explains_forces
 
@@ -34,11 +34,13 @@ if TYPE_CHECKING:
 
 _EXAMPLE = """\b
 Examples:
-  tirelib rig --plan straight --out build/out/straight
-  tirelib identify build/out/straight --out build/out/M.toml
-  tirelib diagnose build/out/straight --model build/out/M.toml --out build/out/diagnosed
-  tirelib diagnose build/out/straight --model build/out/M.toml --effects mine.py --json D.json
-  tirelib diagnose build/out/cornering --model build/out/M.toml --quantity Fy --out build/out/Fy
+  tirelib rig --plan short --hide sidewall_damping=0.05 --out straight
+  tirelib identify straight --out M.toml
+  tirelib diagnose straight --model M.toml --out diagnosed
+  tirelib diagnose straight --model M.toml --effects mine.py --json D.json
+  tirelib rig --plan set1 --out cornering
+  tirelib identify cornering --out M-forces.toml
+  tirelib diagnose cornering --model M-forces.toml --quantity Fy --out diagnosed-Fy
 
 \b
 Verdicts: none, named, form_inadequate (right effect, wrong law), indistinguishable (several would
@@ -57,6 +59,7 @@ SHOWN = 8
 @false_alarm_option
 @report_option("diagnosis")
 @json_option()
+@progress_options
 def diagnose(
     folder: Path,
     model_name: str,
@@ -194,7 +197,7 @@ def _table(candidates: list[dict[str, Any]]) -> Table:
     for column in (
         "effect",
         "level",
-        "score/threshold",
+        "score / threshold",
         "strength",
         "std",
         "unit",

@@ -10,8 +10,9 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from tirelib.cli.common import output, progress_bar, write_json
+from tirelib.cli.common import output, write_json
 from tirelib.cli.options import effects_option, json_option
+from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.errors import FormatError
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ again. Exit code: 0 all passed, 2 one did not.
 @click.command(epilog=_EXAMPLE)
 @effects_option
 @json_option("what each effect is: title, stage, unit, range, source, law")
+@progress_options
 def effects(effect_files: tuple[Path, ...], json_file: Path | None) -> None:
     """List the effects of the catalogue, or register effects of your own."""
     from tirelib.effects import CATALOGUE

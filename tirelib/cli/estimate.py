@@ -17,11 +17,11 @@ from tirelib.cli.common import (
     NEW_FILE,
     NEW_FOLDER,
     output,
-    progress_bar,
     write_json,
 )
 from tirelib.cli.limits import extrapolated, not_checked, not_given, outside, weakly_checked
 from tirelib.cli.options import json_option
+from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.documents import file_hash
 from tirelib.errors import CalibrationError
 from tirelib.estimators.calibration import Calibration
@@ -36,8 +36,11 @@ from tirelib.signal import LowPass
 
 _EXAMPLE = """\b
 Examples:
-  tirelib estimate data/another-day --calibration build/out/cal.toml --json build/out/e.json
-  tirelib estimate data/commute --calibration build/out/cal.toml --out build/out/turns.parquet
+  tirelib rig --plan set1 --seed 1 --repeats 6 --out day1
+  tirelib rig --plan set1 --seed 2 --out day2
+  tirelib calibrate day1 --out cal.toml
+  tirelib estimate day2 --calibration cal.toml --json estimates.json --report estimated
+  tirelib estimate commute --calibration cal.toml --out turns.parquet
 
 \b
 DIR is a campaign, or a continuous recording (a folder with a recording.toml): hours of driving, one
@@ -72,6 +75,7 @@ probably another one.
     help="Write every turn as a table, one row each; of a recording they are then not in --json.",
 )
 @json_option("every turn")
+@progress_options
 @click.pass_context
 def estimate(
     context: click.Context,

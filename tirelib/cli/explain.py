@@ -18,6 +18,7 @@ from tirelib.cli.common import (
     write_json,
 )
 from tirelib.cli.options import effects_option, json_option, quantity_option
+from tirelib.cli.progress import chosen_words, progress_options
 from tirelib.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.journey import QUANTITIES, explains_forces
 
@@ -34,9 +35,10 @@ STEPS = {
 """What each verb does on the way, as it is said while it runs."""
 _EXAMPLE = """\b
 Examples:
-  tirelib rig --plan straight --out build/out/straight
-  tirelib explain build/out/straight --out build/out/explained
-  tirelib explain build/out/cornering --quantity Fy --out build/out/Fy --json E.json
+  tirelib rig --plan short --hide sidewall_damping=0.05 --out straight
+  tirelib explain straight --out explained
+  tirelib rig --plan set1 --out cornering
+  tirelib explain cornering --quantity Fy --out explained-Fy --json E.json
 
 \b
 It runs identify, compare, diagnose, add for each effect that is named, and compare again.
@@ -64,6 +66,7 @@ be run one by one. Exit code: 0 whatever the verdict, 2 bad input or no model co
     help="Write the page, the models and the page of each step.",
 )
 @json_option()
+@progress_options
 def explain(
     folder: Path,
     model_name: str | None,
@@ -223,10 +226,12 @@ class Steps:
         target = self.out / f"{json_name}.json"
         arguments = [*words, "--json", str(target)]
         self.commands.append(shlex.join(["tirelib", *arguments]))
-        click.echo(f"step {len(self.commands)}: {STEPS[words[0]]}", err=True)
+        progress = chosen_words()
+        if "--quiet" not in progress:
+            click.echo(f"step {len(self.commands)}: {STEPS[words[0]]}", err=True)
         said = io.StringIO()
         with redirect_stdout(said):
-            code = program.main(arguments, prog_name="tirelib", standalone_mode=False)
+            code = program.main([*arguments, *progress], prog_name="tirelib", standalone_mode=False)
         if code:
             raise CalibrationError(
                 f"{shlex.join(['tirelib', *words])}: it ended with exit code {code}: "

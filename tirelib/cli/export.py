@@ -19,8 +19,10 @@ FORMAT = "tirelib-export/1"
 
 _EXAMPLE = """\b
 Examples:
-  tirelib export build/out/M.toml --tir build/out/tire.tir
-  tirelib export build/out/cornering --tir build/out/tire.tir --json build/out/tire.json
+  tirelib rig --plan set1 --out cornering
+  tirelib export cornering --tir tire.tir --json tire.json
+  tirelib identify cornering --out M.toml
+  tirelib export M.toml --tir brush.tir
 
 \b
 SOURCE is a model file, whose brush is evaluated over loads, pressures and slips, or the folder of a

@@ -10,10 +10,10 @@ from tirelib.cli.common import (
     CAMPAIGN,
     NEW_FILE,
     output,
-    progress_bar,
     write_json,
 )
 from tirelib.cli.options import json_option, low_pass_options
+from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.documents import new_file
 from tirelib.errors import FormatError
 from tirelib.flags import TurnFlag
@@ -23,8 +23,9 @@ from tirelib.signal import LowPass
 FORMAT = "tirelib-features/1"
 
 _EXAMPLE = """\b
-Example:
-  tirelib features data/my-campaign --out build/out/features.parquet
+Examples:
+  tirelib rig --plan short --out straight
+  tirelib features straight --out features.parquet
 
 \b
 One row per turn and gage, SI units, angles in rad from the middle of the centre
@@ -44,6 +45,7 @@ gage's contact, ISO 8855 axes. FILE may end in .parquet or .csv.
 )
 @low_pass_options
 @json_option("a summary")
+@progress_options
 def features(
     folder: Path, target: Path, order: float | None, cut_off: float | None, json_file: Path | None
 ) -> None:

@@ -28,11 +28,15 @@ SHOWN = 5
 
 _EXAMPLE = """\b
 Examples:
-  tirelib fleet check data/ --out build/out/fleet
-  tirelib fleet estimate "data/wheel-*" --calibration cal.toml --out build/out/fleet
+  tirelib rig --plan short --seed 1 --out campaigns/a
+  tirelib rig --plan short --seed 2 --out campaigns/b
+  tirelib fleet check campaigns --out results
+  tirelib fleet identify campaigns --out results
+  tirelib fleet diagnose campaigns --model results --out results --with "--quantity strain"
+  tirelib fleet calibrate campaigns --out results
+  tirelib fleet estimate "campaigns/*" --calibration results --out results
   tirelib fleet identify s3://bucket/campaigns --out s3://bucket/results \\
       --scheduler tcp://scheduler:8786
-  tirelib fleet diagnose data/ --model build/out/fleet --out build/out/fleet --with "--quantity Fy"
 
 \b
 PATHS are folders, patterns or URLs; every campaign (campaign.toml) and recording (recording.toml)
@@ -64,7 +68,7 @@ def run_verb(command: Sequence[str]) -> tuple[int, str]:
     said = StringIO()
     with redirect_stdout(said), redirect_stderr(said):
         try:
-            code = program.main(list(command), prog_name="tirelib", standalone_mode=False)
+            code = program.main([*command, "--quiet"], prog_name="tirelib", standalone_mode=False)
         except click.ClickException as error:
             raise ParameterError(error.format_message()) from None
     return int(code or 0), said.getvalue()

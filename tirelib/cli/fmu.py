@@ -13,12 +13,12 @@ from tirelib.cli.common import (
     NEW_FILE,
     NEW_FOLDER,
     output,
-    progress_bar,
     write_json,
 )
 from tirelib.cli.estimate import exit_code, print_document
 from tirelib.cli.fmu_virtual import virtual
 from tirelib.cli.options import json_option
+from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.costs import costs_of
@@ -33,14 +33,18 @@ from tirelib.signal import LowPass
 
 _GROUP = """\b
 Examples:
+  tirelib rig --plan set1 --seed 1 --repeats 6 --out day1
+  tirelib calibrate day1 --out cal.toml
   tirelib fmu build --calibration cal.toml --out StrainTire.fmu --samples-per-step 10
   tirelib fmu virtual --out VirtualTire.fmu --samples-per-step 10
-  tirelib fmu check StrainTire.fmu --out build/out/fmu_check
-  tirelib fmu run StrainTire.fmu data/another-day --json f.json
+  tirelib fmu check StrainTire.fmu --out checked
+  tirelib fmu run StrainTire.fmu day1 --json f.json
 """
 _BUILD = """\b
 Examples:
-  tirelib fmu build --calibration build/out/cal.toml --out build/out/StrainTire.fmu
+  tirelib rig --plan set1 --seed 1 --repeats 6 --out day1
+  tirelib calibrate day1 --out cal.toml
+  tirelib fmu build --calibration cal.toml --out StrainTire.fmu
   tirelib fmu build --calibration cal.toml --out X.fmu --samples-per-step 10      # 1 ms at 10 kHz
   tirelib fmu build --calibration cal.toml --out X.fmu --samples-per-step 32 --buffered
   tirelib fmu build --calibration cal.toml --out X.fmu --sealed     # to hand over
@@ -55,23 +59,30 @@ is free, and the input `samples` gives the number of new samples in the frame; t
 the same.
 """
 _TABLE = """\b
-Example:
-  tirelib fmu table build/out/cal.toml --out build/out/cal.table
+Examples:
+  tirelib rig --plan set1 --seed 1 --repeats 6 --out day1
+  tirelib calibrate day1 --out cal.toml
+  tirelib fmu table cal.toml --out cal.table
 
 \b
 The FMU reads no TOML; its parameter `calibration` takes the path of this file. (One built with
 --python takes CAL.toml itself.)
 """
 _RUN = """\b
-Example:
-  tirelib fmu run build/out/StrainTire.fmu data/another-day --json build/out/f.json
+Examples:
+  tirelib rig --plan set1 --seed 1 --repeats 6 --out day1
+  tirelib calibrate day1 --out cal.toml
+  tirelib fmu build --calibration cal.toml --out StrainTire.fmu
+  tirelib rig --plan set1 --seed 2 --out day2
+  tirelib fmu run StrainTire.fmu day2 --json f.json
 
 \b
 JSON: as `tirelib estimate`. Exit code 1: not one turn is valid.
 """
 _CHECK = """\b
 Examples:
-  tirelib fmu check build/out/StrainTire.fmu
+  tirelib fmu virtual --out VirtualTire.fmu
+  tirelib fmu check VirtualTire.fmu
   tirelib fmu check Foreign.fmu --reference cross-check/Foreign --json check.json --out report
 
 \b
@@ -126,7 +137,7 @@ fmu.add_command(virtual)
     type=float,
     default=math.nan,
     show_default="NaN",
-    help="What an output shows where it has no value; see docs/howto/fmu.md.",
+    help="What an output shows where it has no value, for tools that do not take NaN.",
 )
 @click.option(
     "--python",
@@ -146,6 +157,7 @@ fmu.add_command(virtual)
     help="Version of FMI.",
 )
 @click.option("--native", is_flag=True, hidden=True, expose_value=False)
+@progress_options
 def build(
     calibration: Path,
     out: Path,
@@ -196,6 +208,7 @@ def table(calibration: Path, out: Path) -> None:
 @click.argument("file", metavar="X.fmu", type=FILE)
 @click.argument("folder", metavar="DIR", type=CAMPAIGN)
 @json_option("every turn")
+@progress_options
 @click.pass_context
 def run(context: click.Context, file: Path, folder: Path, json_file: Path | None) -> None:
     """Step the FMU through every run of DIR with FMPy, and compare with the rig."""
@@ -223,6 +236,7 @@ def run(context: click.Context, file: Path, folder: Path, json_file: Path | None
 )
 @click.option("--out", metavar="REPORT", type=NEW_FOLDER, help="Folder for the page.")
 @json_option("the result")
+@progress_options
 @click.pass_context
 def check(
     context: click.Context,

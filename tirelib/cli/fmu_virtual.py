@@ -4,16 +4,17 @@ from pathlib import Path
 
 import click
 
-from tirelib.cli.common import FILE, NEW_FILE, output, progress_bar
+from tirelib.cli.common import FILE, NEW_FILE, output
+from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.errors import ParameterError
 from tirelib.fmu.parts import DEFAULT_RATE
 from tirelib.fmu.virtual.spec import build_virtual, default_surface, friction_surface
 
 _EPILOG = """\b
 Examples:
-  tirelib fmu virtual --out build/out/VirtualTire.fmu --samples-per-step 10
-  tirelib fmu virtual --out build/out/VirtualTire.fmu --friction     # friction is an input
-  tirelib fmu check build/out/VirtualTire.fmu
+  tirelib fmu virtual --out VirtualTire.fmu --samples-per-step 10
+  tirelib fmu virtual --out Wet.fmu --friction     # friction is an input
+  tirelib fmu check VirtualTire.fmu
 
 \b
 FMI 2.0 co-simulation, one wheel: Fz, alpha, kappa, camber, speed and pressure in, strain frames out
@@ -50,6 +51,7 @@ for StrainTire.fmu with the same samples per step. Needs CPython with numpy and 
     is_flag=True,
     help="Use the reference tire's response surface with friction as an input.",
 )
+@progress_options
 def virtual(
     out: Path, samples_per_step: int, sample_rate: float, surface: Path | None, friction: bool
 ) -> None:

@@ -10,8 +10,9 @@ from rich.console import Console
 from rich.table import Table
 
 from tirelib.campaign import Campaign, read_campaign
-from tirelib.cli.common import CAMPAIGN, NEW_FILE, output, progress_bar, write_json
+from tirelib.cli.common import CAMPAIGN, NEW_FILE, output, write_json
 from tirelib.cli.options import json_option
+from tirelib.cli.progress import is_verbose, progress_bar, progress_options
 
 if TYPE_CHECKING:
     from tirelib.identify.whole import Whole
@@ -20,9 +21,9 @@ BASES = ("plain", "dissertation")
 
 _EXAMPLE = """\b
 Examples:
-  tirelib rig --plan straight --out build/out/straight
-  tirelib identify build/out/straight --out build/out/M.toml --json build/out/identified.json
-  tirelib simulate --model build/out/M.toml --load 4000 --speed 80 --out build/out/simulated
+  tirelib rig --plan short --hide sidewall_damping=0.05 --out straight
+  tirelib identify straight --out M.toml --json identified.json
+  tirelib simulate --model M.toml --load 4000 --speed 80 --out simulated
 
 \b
 The ring is fitted to straight runs with strain, the brush to forces over slip; either alone is
@@ -58,6 +59,7 @@ whose interval is wider than 25 % to either side, with the test that would deter
     help="File for the identified model, which the other commands read.",
 )
 @json_option()
+@progress_options
 @click.pass_context
 def identify(
     context: click.Context,
@@ -97,6 +99,8 @@ def identify(
     if json_file is not None:
         write_json(json_file, document)
         console.print(f"written: {json_file}")
+    console.print(f"next: tirelib compare {folder} --model {out} --out compared")
+    console.print(f"      tirelib diagnose {folder} --model {out} --out diagnosed")
     brush = document["brush"]
     every = [*document["parameters"], *(brush["parameters"] if brush else [])]
     told = any("not_identifiable" not in entry["flags"] for entry in every)
@@ -195,6 +199,26 @@ def _say_pressure(console: Console, found: dict[str, Any]) -> None:
 
 
 def _say_parameters(console: Console, parameters: list[dict[str, Any]]) -> None:
+    """Print what the runs determine; what they do not is named, and printed with ``-v``."""
+    known = [entry for entry in parameters if "not_identifiable" not in entry["flags"]]
+    console.print(_table(known if not is_verbose() else parameters))
+    unknown = [entry for entry in parameters if entry not in known]
+    if unknown:
+        console.print(
+            f"  {len(unknown)} parameters are not determined: the 95 % interval reaches further "
+            f"than 25 % to either side: {', '.join(entry['name'] for entry in unknown)}"
+        )
+    helped = [entry for entry in parameters if entry["helps"]]
+    if is_verbose():
+        for entry in helped:
+            console.print(
+                f"  {entry['name']}: {', '.join(entry['flags'])}; would help: {entry['helps']}"
+            )
+    elif helped:
+        console.print("  -v prints their values, and the test that would help with each")
+
+
+def _table(parameters: list[dict[str, Any]]) -> Table:
     table = Table(box=SIMPLE_HEAD)
     for column in ("parameter", "value", "95 % from", "to", "unit", "flags"):
         words = column in ("parameter", "unit", "flags")
@@ -206,9 +230,4 @@ def _say_parameters(console: Console, parameters: list[dict[str, Any]]) -> None:
             entry["unit"],
             ", ".join(entry["flags"]),
         )
-    console.print(table)
-    for entry in parameters:
-        if entry["helps"]:
-            console.print(
-                f"  {entry['name']}: {', '.join(entry['flags'])}; would help: {entry['helps']}"
-            )
+    return table

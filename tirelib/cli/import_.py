@@ -12,17 +12,18 @@ from tirelib.campaign.importing.delimited import CsvOptions
 from tirelib.campaign.importing.importer import ImportReport, import_campaign
 from tirelib.campaign.importing.mapfile import parse_map
 from tirelib.campaign.importing.suggest import list_columns, suggest_map
-from tirelib.cli.common import FILE, NEW_FOLDER, output, progress_bar, write_json
+from tirelib.cli.common import FILE, NEW_FOLDER, output, write_json
 from tirelib.cli.options import json_option
+from tirelib.cli.progress import progress_bar, progress_options
 
 FORMAT = "tirelib-import/1"
 LIST_FORMAT = "tirelib-import-list/1"
 
 _EXAMPLE = """\b
-Example:
-  tirelib import data/cornering.mat --list
-  tirelib import data/cornering.mat --suggest > cornering.map.toml
-  tirelib import data/cornering.mat --map cornering.map.toml --out build/out/cornering
+Examples:
+  tirelib import cornering.mat --list
+  tirelib import cornering.mat --suggest > cornering.map.toml
+  tirelib import cornering.mat --map cornering.map.toml --out cornering
 
 \b
 A map:
@@ -51,6 +52,7 @@ Exit code: 0 done, 2 bad input (all faults are listed, nothing is written).
 @click.option("--list", "show_list", is_flag=True, help="List the columns of each FILE and stop.")
 @click.option("--suggest", is_flag=True, help="Print a draft of the map for FILE and stop.")
 @json_option("a summary")
+@progress_options
 def import_(
     files: tuple[Path, ...],
     map_file: Path | None,

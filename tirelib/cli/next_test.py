@@ -15,7 +15,6 @@ from tirelib.cli.common import (
     CAMPAIGN,
     FILE,
     output,
-    progress_bar,
     write_json,
 )
 from tirelib.cli.diagnose import of_forces
@@ -27,6 +26,7 @@ from tirelib.cli.options import (
     quantity_option,
     report_option,
 )
+from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.errors import FormatError, ParameterError
 from tirelib.journey import explains_forces
 
@@ -41,10 +41,12 @@ if TYPE_CHECKING:
 
 _EXAMPLE = """\b
 Examples:
-  tirelib next-test build/out/straight --model build/out/M.toml --json N.json --out build/out/next
-  tirelib next-test build/out/straight --model M.toml --diagnosis build/out/diagnosed/diagnosis.json
-  tirelib next-test build/out/straight --model M.toml --suspects sidewall_load,temperature \\
-      --load-range 2000 7000 --pressure-range 1.6 2.6 --speed-range 20 130
+  tirelib rig --plan short --hide sidewall_damping=0.05 --out straight
+  tirelib identify straight --out M.toml
+  tirelib diagnose straight --model M.toml --out diagnosed
+  tirelib next-test straight --model M.toml --diagnosis diagnosed/diagnosis.json
+  tirelib next-test straight --model M.toml --suspects sidewall_load,temperature \\
+      --load-range 2000 7000 --pressure-range 1.6 2.6 --speed-range 20 130 --out next
 
 \b
 Without --diagnosis or --suspects the campaign is diagnosed first (a minute or so). Ranges that are
@@ -115,6 +117,7 @@ DIAGNOSIS = "tirelib-diagnosis/1"
 @false_alarm_option
 @report_option("next_test")
 @json_option()
+@progress_options
 def next_test(
     folder: Path,
     model_name: str,

@@ -7,8 +7,9 @@ import click
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from tirelib.cli.common import NEW_FOLDER, output, progress_bar, write_json
+from tirelib.cli.common import NEW_FOLDER, output, write_json
 from tirelib.cli.options import json_option
+from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -18,8 +19,9 @@ RIG_FORMAT = "tirelib-rig/1"
 
 _EXAMPLE = """\b
 Examples:
-  tirelib rig --plan set1 --out build/out/set1 --seed 1 --repeats 6
-  tirelib rig --plan short --hide sidewall_load=0.3 --out build/out/hidden
+  tirelib rig --list
+  tirelib rig --plan set1 --seed 1 --repeats 6 --out day1
+  tirelib rig --plan short --hide sidewall_load=0.3 --out straight
 
 \b
 The folder is a campaign (campaign.toml, runs.csv, runs/NNN.mf4). Its truth.csv holds the noise-free
@@ -86,6 +88,7 @@ in SI and ISO signs.
 @click.option("--force", is_flag=True, help="Write into a folder that is not empty.")
 @click.option("--list", "show_list", is_flag=True, help="List plans and tires, and stop.")
 @json_option("a summary")
+@progress_options
 def rig(
     plan_name: str | None,
     out: Path | None,

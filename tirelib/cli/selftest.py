@@ -12,7 +12,6 @@ from tirelib.campaign import read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
     output,
-    progress_bar,
     write_json,
 )
 from tirelib.cli.options import (
@@ -23,14 +22,16 @@ from tirelib.cli.options import (
     report_option,
     seed_option,
 )
+from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.errors import ParameterError
 
 _EXAMPLE = """\b
 Examples:
-  tirelib selftest build/out/straight --model build/out/M.toml
-  tirelib selftest build/out/straight --model build/out/M.toml --repeats 20 --out build/out/self
-  tirelib selftest build/out/straight --model M.toml --effects-of sidewall_load,temperature
-  tirelib selftest build/out/straight --model M.toml --effects mine.py --ratio 1.1 --ratio 1.3
+  tirelib rig --plan short --hide sidewall_damping=0.05 --out straight
+  tirelib identify straight --out M.toml
+  tirelib selftest straight --model M.toml --effects-of sidewall_load,temperature
+  tirelib selftest straight --model M.toml --repeats 20 --out selftested
+  tirelib selftest straight --model M.toml --effects mine.py --ratio 1.1 --ratio 1.3
 
 \b
 The error ratio is the rms residual of the fitted model with the effect planted, over that without.
@@ -67,6 +68,7 @@ Exit code: 0 done, 2 bad input.
 @seed_option
 @report_option("selftest")
 @json_option()
+@progress_options
 def selftest(
     folder: Path,
     model_name: str,

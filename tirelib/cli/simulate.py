@@ -37,8 +37,10 @@ Examples:
   tirelib simulate --model table-6-1 --load 4000
   tirelib simulate --model table-6-1 --deflection 25 --omega 59 --damping 0.04 --json s.json
   tirelib simulate --model table-6-2-195-65r15 --load 1500,3000,4500 --pressure 2.3 --speed 65 \\
-                   --out build/out/simulate
-  tirelib simulate --model build/out/M.toml --load 1500,4500,7500 --speed 80 --out build/out/mine
+                   --out simulated
+  tirelib rig --plan short --hide sidewall_damping=0.05 --out straight
+  tirelib identify straight --out M.toml
+  tirelib simulate --model M.toml --load 1500,4500,7500 --speed 80 --out mine
 
 \b
 A model file of `identify` or `add` is simulated as it was fitted, with large displacements and its

@@ -13,8 +13,9 @@ from tirelib.errors import ParameterError
 _EXAMPLE = """\b
 Examples:
   tirelib studio
-  tirelib studio build/out/straight
-  tirelib studio build/out/straight --port 8765 --no-browser
+  tirelib rig --plan short --hide sidewall_damping=0.05 --out straight
+  tirelib studio straight
+  tirelib studio straight --port 8765 --no-browser
 
 \b
 The page opens a campaign, shows where the base model fails, names the effect that is missing, adds

@@ -33,9 +33,13 @@ OPTIONAL = dict.fromkeys(
 
 _EXAMPLE = """\b
 Examples:
-  tirebench emulate --campaign build/out/set1 --run 3 --port-file build/out/port
-  tirebench run --port /dev/ttyUSB0 --fmu build/out/StrainTire.fmu --speed 65 --record live.mcap
-  tirebench run --replay live.mcap --fmu build/out/StrainTire.fmu --json live.json
+  tirelib rig --plan set1 --seed 1 --repeats 6 --out day1
+  tirelib calibrate day1 --out cal.toml
+  tirelib fmu build --calibration cal.toml --out StrainTire.fmu --samples-per-step 16
+  tirebench emulate --campaign day1 --run 3 --port-file port &
+  tirebench run --port-file port --wait --fmu StrainTire.fmu --speed 65 --pressure 2.3 \\
+      --record live.mcap --silence 5
+  tirebench run --replay live.mcap --fmu StrainTire.fmu --json live.json --no-page
 
 \b
 Exit code: 0 done, 1 the command ran and its answer is negative, 2 bad input.

@@ -33,10 +33,11 @@ AHEAD = 60.0
 
 _EXAMPLE = """\b
 Examples:
-  tirebench emulate --campaign build/out/set1 --run 3 --run 7 --port-file port --conditions c.json
+  tirelib rig --plan set1 --out day1
+  tirebench emulate --campaign day1 --run 3 --run 7 --port-file port --conditions c.json
   tirebench run --port $(cat port) --conditions c.json --fmu StrainTire.fmu --silence 1
   tirebench emulate --manoeuvre lane_change.toml --format RAW16 --wheel 0 --wheel 1 --truth t.csv
-  tirebench emulate --campaign build/out/set1 --link port --unplug 3 --replug 0.5 --loop
+  tirebench emulate --campaign day1 --link port --unplug 3 --replug 0.5 --loop
   tirebench emulate --recording a.mcap --bus can:socketcan:vcan0
 
 \b

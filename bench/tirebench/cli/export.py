@@ -29,8 +29,8 @@ TABLES, MDF = (".csv", ".parquet"), ".mf4"
 
 _EXAMPLE = """\b
 Examples:
-  tirebench export live.mcap --out build/out/live             # campaign folder with MDF4
-  tirebench export live.mcap --out build/out/live --like build/out/set1
+  tirebench export live.mcap --out live             # campaign folder with MDF4
+  tirebench export live.mcap --out live --like day1
   tirebench export live.mcap --out live.parquet
   tirebench export live.mcap --out live.mf4                   # all of it in one MDF4 file
   tirebench export bus.mcap --out bus.blf                     # or .asc, .log

@@ -23,7 +23,8 @@ def test_a_sound_campaign_exits_0_and_says_so(write: Write) -> None:
     result = call("check", write())
     assert result.exit_code == 0, result.output
     assert result.stdout.strip().endswith("0 errors, 0 warnings: sound")
-    assert result.stderr == ""
+    assert result.stderr.splitlines() == ["checking ..."]
+    assert call("check", write(), "--quiet").stderr == ""
 
 
 def test_errors_exit_1_and_all_are_listed_and_counted(

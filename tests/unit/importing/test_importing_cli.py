@@ -125,5 +125,5 @@ def test_a_file_that_is_not_there_is_a_fault_like_others(tmp_path: Path) -> None
 
 def test_help_shows_an_example() -> None:
     result = call("--help")
-    assert "tirelib import data/cornering.mat --map cornering.map.toml --out" in result.stdout
+    assert "tirelib import cornering.mat --map cornering.map.toml --out" in result.stdout
     assert "import" in CliRunner().invoke(program, ["--help"]).stdout
