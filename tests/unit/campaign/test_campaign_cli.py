@@ -20,11 +20,12 @@ def call(*arguments: str | Path) -> Result:
 
 
 def test_a_sound_campaign_exits_0_and_says_so(write: Write) -> None:
-    result = call("check", write())
+    folder = write()
+    result = call("check", folder)
     assert result.exit_code == 0, result.output
     assert result.stdout.strip().endswith("0 errors, 0 warnings: sound")
     assert result.stderr.splitlines() == ["checking ..."]
-    assert call("check", write(), "--quiet").stderr == ""
+    assert call("check", folder, "--quiet").stderr == ""
 
 
 def test_errors_exit_1_and_all_are_listed_and_counted(
@@ -88,7 +89,7 @@ def test_an_empty_folder_exits_1(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("verb", ["check", "show"])
 def test_help_shows_an_example(verb: str) -> None:
-    assert f"tirelib campaign {verb} data/my-campaign" in call(verb, "--help").output
+    assert f"tirelib campaign {verb} straight" in call(verb, "--help").output
 
 
 def png_size(file: Path) -> tuple[int, int]:
