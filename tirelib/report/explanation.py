@@ -150,15 +150,21 @@ def _by_p(told: Mapping[str, Any]) -> str:
             f"A share of {p} of plain tires, in which nothing is hidden, show as much as this one "
             f"(p = {p}; below {level} something would be missing).{most}"
         )
-    if told["verdict"] in ("unknown", "form_inadequate"):
+    it = "it" if len(told["sets"] and told["sets"][0]) == 1 else "them"
+    if told["verdict"] not in ("unknown", "form_inadequate"):
+        return (
+            f"Without {it} the model is rejected (p = {without}); with {it} nothing stands out of "
+            f"what plain tires show (p = {p})."
+        )
+    stands = f"{_stands(told['misfit_of'])} stands out of what plain tires show."
+    if told["verdict"] == "unknown":
         return (
             f"Every hypothesis that was tried is rejected (p = {p} of the likeliest, "
-            f"{level} is needed): {_stands(told['misfit_of'])} stands out of what plain tires show."
+            f"{level} is needed): {stands}"
         )
-    it = "it" if len(told["sets"][0]) == 1 else "them"
     return (
-        f"Without {it} the model is rejected (p = {without}); with {it} nothing stands out of what "
-        f"plain tires show (p = {p})."
+        f"Without {it} the model is rejected (p = {without}), and with {it} as well "
+        f"(p = {p}; {level} is needed): {stands}"
     )
 
 

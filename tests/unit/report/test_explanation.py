@@ -150,6 +150,34 @@ def test_a_p_value_stands_in_the_place_of_a_score_where_there_is_one() -> None:
     assert "times as clear" not in told.sure
 
 
+@pytest.mark.parametrize(
+    ("verdict", "said"),
+    [
+        (
+            "form_inadequate",
+            "Without it the model is rejected (p = 0.024), and with it as well (p = 0.03; 0.05 is "
+            "needed): the law of damping stands out",
+        ),
+        ("unknown", "Every hypothesis that was tried is rejected (p = 0.03 of the likeliest"),
+    ],
+)
+def test_a_rejected_model_says_what_stands_out(verdict: str, said: str) -> None:
+    named = ["damping"] if verdict == "form_inadequate" else []
+    told = explained(
+        diagnosis(
+            verdict=verdict,
+            named=named,
+            candidates=[candidate("damping", p=0.03)],
+            sets=[named] if named else [],
+            p=0.03,
+            p_without=0.024,
+            false_alarm=0.05,
+            misfit_of="roughly damping",
+        )
+    )
+    assert said in told.sure
+
+
 def test_without_a_name_one_error_is_told() -> None:
     told = explained(diagnosis(verdict="none", named=[], error_after=23.5, floor=23.5))
     assert told.error == (
