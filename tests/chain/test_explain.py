@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from tests.chain.test_diagnose import Folder
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
-from tests.unit.force_campaigns import brush_file, write_sweep
+from tests.unit.force_campaigns import brush_file, steady_runs, write_forces
 from tirelib import waveforms
 from tirelib.cli import program
 from tirelib.errors import TirelibError
@@ -75,9 +75,9 @@ def strain(tmp_path_factory: pytest.TempPathFactory) -> Any:
 @pytest.fixture(scope="module")
 def forces(tmp_path_factory: pytest.TempPathFactory) -> Any:
     folder = tmp_path_factory.mktemp("forces")
-    campaign = write_sweep(folder / "sweep", 81, {"friction_load": 0.12})
+    campaign = write_forces(folder / "steady", steady_runs(slope=0.25), "steady")
     write_tire(brush_file(campaign), folder / "M.toml", "tirelib-model/1")
-    return journey(folder / "out", folder / "sweep", "--model", folder / "M.toml")
+    return journey(folder / "out", folder / "steady", "--model", folder / "M.toml")
 
 
 def test_what_was_planted_is_named_added_and_the_error_falls(strain: Any) -> None:

@@ -193,7 +193,7 @@ def test_the_next_test_of_forces_is_the_diagnosis_s_advice(
     place: Path, told: dict[str, Any]
 ) -> None:
     words = ("next-test", place / "sweep", "--model", place / "M.toml", "--quantity", "Fy")
-    plan = done(*words, "--json", place / "N.json")
+    plan = done(*words, "--diagnosis", place / "D.json", "--json", place / "N.json")
     assert plan["format"] == "tirelib-next-test/1"
     assert (plan["quantity"], plan["verdict"]) == ("Fy", told["verdict"])
     # one set of effects is left
@@ -266,9 +266,16 @@ def test_a_tire_whose_curve_is_no_brush_but_lacks_no_effect_is_given_no_name(
     assert found["error_before"] > 1.2
 
 
-def test_steady_runs_name_friction_over_load_and_cannot_know_relaxation(place: Path) -> None:
+@pytest.fixture(scope="module")
+def steady(place: Path) -> dict[str, Any]:
     words = ("--model", place / "S.toml", "--json", place / "S.json")
-    found = done("diagnose", place / "steady", *words)
+    return done("diagnose", place / "steady", *words)
+
+
+def test_steady_runs_name_friction_over_load_and_cannot_know_relaxation(
+    steady: dict[str, Any],
+) -> None:
+    found = steady
     assert found["named"] == ["friction_load"]
     assert "relaxation" in found["dead"]
     assert found["candidates"][0]["strength"] == pytest.approx(0.25, abs=0.03)
@@ -276,6 +283,14 @@ def test_steady_runs_name_friction_over_load_and_cannot_know_relaxation(place: P
     assert found["dead_reasons"]["friction_temperature"] == (
         "tread temperature is not measured at every point"
     )
+
+
+def test_a_next_test_without_a_diagnosis_makes_its_own(place: Path, steady: dict[str, Any]) -> None:
+    words = ("next-test", place / "steady", "--model", place / "S.toml")
+    plan = done(*words, "--json", place / "N.json")
+    assert (plan["quantity"], plan["verdict"]) == ("Fy", steady["verdict"])
+    assert plan["between"] == []
+    assert plan["what"] == steady["next_test"]["what"]
 
 
 def test_without_repeats_there_are_hints_only(place: Path) -> None:

@@ -1,4 +1,4 @@
-"""The studio in a real browser: clicks from a sweep of forces to the added effect; attacks."""
+"""The studio in a real browser: clicks from runs of forces to the added effect; attacks."""
 
 import json
 import re
@@ -16,7 +16,7 @@ import pytest
 
 from tests.bench.browser import chromium
 from tests.bench.programs import PATIENCE
-from tests.unit.force_campaigns import write_sweep
+from tests.unit.force_campaigns import steady_runs, write_forces
 from tests.unit.studio.conftest import TOKEN, Served, until
 
 
@@ -47,7 +47,7 @@ def serve(folder: Path, *words: str) -> Iterator[tuple[subprocess.Popen[str], st
 
 
 def test_five_clicks_add_the_effect_that_forces_lack(browser: Any, tmp_path: Path) -> None:
-    write_sweep(tmp_path / "sweep", 81, {"friction_load": 0.12})
+    write_forces(tmp_path / "steady", steady_runs(slope=0.25), "steady")
     complaints: list[str] = []
     addresses: list[str] = []
     page = browser.new_context(viewport={"width": 1280, "height": 800}).new_page()
@@ -55,7 +55,7 @@ def test_five_clicks_add_the_effect_that_forces_lack(browser: Any, tmp_path: Pat
     page.on("console", lambda said: complaints.append(said.text))
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("request", lambda request: addresses.append(request.url))
-    with serve(tmp_path, str(tmp_path / "sweep")) as (server, url):
+    with serve(tmp_path, str(tmp_path / "steady")) as (server, url):
         page.goto(url)
         page.get_by_role("button", name="Find what is missing").click()  # click 1
         page.locator("input[data-effect=friction_load]").click()  # click 2

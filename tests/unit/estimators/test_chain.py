@@ -148,7 +148,7 @@ def test_the_pressure_law_adds_the_inflation_over_the_contact_area(trained: Trai
 
 
 def test_pressure_becomes_an_input_when_it_was_varied(
-    cornering: Campaign, pressures: Campaign
+    cornering: Campaign, pressures: Campaign, trained: Trained
 ) -> None:
     both = train(observe([cornering, pressures]))
     assert both.calibration.chains[-1].laws.pressure_fitted
@@ -162,13 +162,21 @@ def test_pressure_becomes_an_input_when_it_was_varied(
     assert not refused.turn_valid.any()
     assert (refused.flags[1:] & TurnFlag.NO_CONDITION > 0).all()
     assert both.calibration.needed == ("pressure",)
-    alone = train(observe([cornering])).calibration
-    assert alone.needed == ()
-    assert alone.estimate(unknown).turn_valid[1:].all()
+    assert trained.calibration.needed == ()
+    assert trained.calibration.estimate(unknown).turn_valid[1:].all()
 
 
-def test_slip_ratio_and_rolling_condition(cornering: Campaign, braking: Campaign) -> None:
-    both = train(observe([cornering, braking]))
+@pytest.fixture(scope="module")
+def both(cornering: Campaign, braking: Campaign) -> Trained:
+    return train(observe([cornering, braking]))
+
+
+@pytest.fixture(scope="module")
+def braked(braking: Campaign) -> Trained:
+    return train(observe([braking]))
+
+
+def test_slip_ratio_and_rolling_condition(both: Trained) -> None:
     for kappa, word in ((-0.1, "braking"), (0.0, "free"), (0.1, "driving")):
         found = estimate(both, load=4500.0, slip_ratio=kappa)
         assert abs(np.nanmean(found.value["kappa"]) - kappa) < 2e-3
@@ -242,12 +250,11 @@ def test_too_few_conditions_are_refused(observed: Observations) -> None:
         train(few)
 
 
-def test_what_was_not_varied_is_not_calibrated_and_says_why(braking: Campaign) -> None:
-    trained = train(observe([braking]))
-    assert "measure several loads" in trained.links.refused["Fz"]
-    assert "measure slip angles" in trained.links.refused["Fy"]
-    assert "alpha" in trained.links.refused
-    assert trained.calibration.chains[-1].has("kappa")
+def test_what_was_not_varied_is_not_calibrated_and_says_why(braked: Trained) -> None:
+    assert "measure several loads" in braked.links.refused["Fz"]
+    assert "measure slip angles" in braked.links.refused["Fy"]
+    assert "alpha" in braked.links.refused
+    assert braked.calibration.chains[-1].has("kappa")
 
 
 def test_sweeps_count_turn_by_turn(tmp_path: Path) -> None:
@@ -263,8 +270,8 @@ def test_sweeps_count_turn_by_turn(tmp_path: Path) -> None:
     np.testing.assert_allclose(swept.truth["Fz"][rising], expected, atol=60.0)
 
 
-def test_a_regressor_without_variation_is_named(braking: Campaign) -> None:
-    skipped = train(observe([braking])).skipped
+def test_a_regressor_without_variation_is_named(braked: Trained) -> None:
+    skipped = braked.skipped
     assert "3 conditions for 3 coefficients" in skipped["load from centre contact length"]
     assert "at least" in skipped["Fy from six regressors"]
 
@@ -297,10 +304,7 @@ def test_strain_in_a_wrong_unit_is_out_of_range(trained: Trained, factor: float)
     assert not found.turn_valid.any()
 
 
-def test_combinations_that_were_never_measured_are_out_of_range(
-    cornering: Campaign, braking: Campaign
-) -> None:
-    both = train(observe([cornering, braking]))
+def test_combinations_that_were_never_measured_are_out_of_range(both: Trained) -> None:
     straight = estimate(both, load=4500.0, slip_ratio=-0.1)
     corner = estimate(both, load=4500.0, slip_angle=np.deg2rad(4.0))
     mixed = estimate(both, load=4500.0, slip_angle=np.deg2rad(4.0), slip_ratio=-0.1)
@@ -310,18 +314,17 @@ def test_combinations_that_were_never_measured_are_out_of_range(
 
 
 def test_adding_a_campaign_does_not_spoil_the_first(
-    cornering: Campaign, braking: Campaign, another_day: Campaign
+    trained: Trained, both: Trained, another_day: Campaign
 ) -> None:
     day = observe([another_day])
 
-    def load_error(trained: Trained) -> float:
+    def load_error(known: Trained) -> float:
         summary = estimate_document(
-            day, trained.calibration.estimate(day.features), trained.calibration
+            day, known.calibration.estimate(day.features), known.calibration
         )["summary"]
         return float(summary["Fz"]["rmse"])
 
-    alone = load_error(train(observe([cornering])))
-    assert load_error(train(observe([cornering, braking]))) < 2.0 * alone + 5.0
+    assert load_error(both) < 2.0 * load_error(trained) + 5.0
 
 
 def test_lateral_force_grows_with_a_pressure_that_was_not_varied(trained: Trained) -> None:
