@@ -11,6 +11,8 @@ is quick:
 `read_tire`, `write_tire`                              tires and models
 `identify`, `compare`, `diagnose`, `add`, `simulate`   what a model holds, lacks, gains and predicts
 `build_fmu`, `check_fmu`                               the estimator as an FMU
+`feature_table`, `estimate_table`                      turns as pandas tables
+`parameter_table`, `candidate_table`                   numbers and suspected effects as tables
 =====================================================  ==========================================
 """
 
@@ -30,19 +32,24 @@ if TYPE_CHECKING:
     from tirelib.observations import observe
     from tirelib.parameters import read_tire, write_tire
     from tirelib.stream import StreamEstimator
+    from tirelib.tables import candidate_table, estimate_table, feature_table, parameter_table
 
 __version__ = "0.1.0"
 __all__ = [
     "StreamEstimator",
     "add",
     "build_fmu",
+    "candidate_table",
     "check_campaign",
     "check_fmu",
     "compare",
     "diagnose",
+    "estimate_table",
+    "feature_table",
     "identify",
     "import_campaign",
     "observe",
+    "parameter_table",
     "read_calibration",
     "read_campaign",
     "read_tire",
@@ -56,13 +63,17 @@ _HOMES = {
     "StreamEstimator": "tirelib.stream",
     "add": _JOURNEY,
     "build_fmu": "tirelib.fmu.build",
+    "candidate_table": "tirelib.tables",
     "check_campaign": "tirelib.campaign",
     "check_fmu": "tirelib.fmu.check",
     "compare": "tirelib.compare",
     "diagnose": "tirelib.diagnose",
+    "estimate_table": "tirelib.tables",
+    "feature_table": "tirelib.tables",
     "identify": "tirelib.identify",
     "import_campaign": "tirelib.campaign.importing.importer",
     "observe": "tirelib.observations",
+    "parameter_table": "tirelib.tables",
     "read_calibration": "tirelib.estimators.calibration_file",
     "read_campaign": "tirelib.campaign",
     "read_tire": "tirelib.parameters",

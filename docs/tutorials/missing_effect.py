@@ -84,6 +84,8 @@ print(f"error of the base model: {before.error:.1f} times the noise")
 
 found = tirelib.diagnose(campaign, model, quantity="Fy")
 print("named:", ", ".join(found.named) or "nothing")
+candidates = tirelib.candidate_table(found)
+print(candidates[["level", "score", "threshold", "strength", "std"]].head(4).to_string())
 
 # %%
 # Add what was named, and watch the error fall.

@@ -96,6 +96,12 @@ print(f"{valid.sum()} of {valid.size} turns are valid")
 print(f"error of Fz: {rmse:.1f} N rms; {100 * held:.0f} % of the turns lie in their 95 % interval")
 
 # %%
+# The same as a pandas table, a row for each turn, beside what the rig measured (SI units):
+
+table = tirelib.estimate_table(observed, estimates)
+print(table[["run", "time", "Fz", "Fz_std", "Fz_measured", "flags"]].head(4).to_string())
+
+# %%
 # The first turn of each run is not valid: nothing is known of the turn before it. Every other
 # reason is a flag of its own (:doc:`/reference/flags`).
 #

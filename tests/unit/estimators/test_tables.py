@@ -1,0 +1,58 @@
+"""Results as pandas tables: they hold what the objects hold, in SI units."""
+
+import numpy as np
+import pytest
+
+import tirelib
+from tirelib.campaign import Campaign
+from tirelib.errors import ParameterError
+from tirelib.estimators.train import Trained
+from tirelib.observations import Observations
+from tirelib.parameters import NUMBERS
+from tirelib.tables import SI_UNITS
+from tirelib.units import TABLE, to_si
+
+
+def test_a_row_of_estimates_is_a_turn_beside_what_was_measured(
+    observed: Observations, trained: Trained
+) -> None:
+    estimates = trained.calibration.estimate(observed.features)
+    table = tirelib.estimate_table(observed, estimates)
+    assert len(table) == len(observed)
+    assert table["Fz"].to_numpy() == pytest.approx(estimates.value["Fz"], nan_ok=True)
+    assert table["alpha_measured"].to_numpy() == pytest.approx(observed.truth["slip_angle"])
+    first = table.groupby("run").first()
+    assert not first["valid"].any()
+    assert set(first["flags"]) == {"first_turn"}
+    assert table.attrs["units"]["alpha_std"] == "rad"
+    error = (table["Fz"] - table["Fz_measured"])[table["valid"]]
+    assert np.sqrt(np.mean(error**2)) < 50.0
+
+
+def test_estimates_of_other_turns_are_refused(
+    observed: Observations, pressures: Campaign, trained: Trained
+) -> None:
+    others = trained.calibration.estimate(tirelib.observe([pressures]).features)
+    with pytest.raises(ParameterError, match="the same turns"):
+        tirelib.estimate_table(observed, others)
+
+
+def test_a_row_of_features_is_a_turn_and_a_gage(observed: Observations) -> None:
+    table = tirelib.feature_table(observed)
+    gages = observed.features.lateral.size
+    assert len(table) == len(observed) * gages
+    assert table["run"].to_numpy() == pytest.approx(np.repeat(observed.run, gages))
+    assert table["contact_angle"].to_numpy() == pytest.approx(
+        observed.features.contact_angle.ravel(), nan_ok=True
+    )
+    assert table.attrs["units"]["contact_angle"] == "rad"
+
+
+def test_every_number_of_a_tire_has_its_si_unit() -> None:
+    table = tirelib.parameter_table(tirelib.read_tire("table-6-1"))
+    assert table.loc["ring_radius", "value"] == pytest.approx(0.2855, rel=0.2)
+    assert table.loc["ring_radius", "unit"] == "m"
+    for field in NUMBERS.values():
+        unit = SI_UNITS[field.dimension]
+        assert to_si(1.0, unit, field.dimension) == 1.0
+    assert {row.dimension for row in TABLE} >= {field.dimension for field in NUMBERS.values()}
