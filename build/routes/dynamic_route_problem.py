@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from routes.correction import Correction, large_displacements
 from routes.dynamic_route_validation import predicted_deflection
 from routes.edges import STRUCTURE, Edges, corrected, edge_bias, model_edges, read_edges
 from routes.static_route_fit import FewFit, Parameter, Quantity, fit_few
@@ -13,7 +14,7 @@ from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact import radial
 from tirelib.errors import CalibrationError, ConvergenceError, ParameterError
 from tirelib.identify.campaign_data import StraightRuns
-from tirelib.model.base import Correction, large_displacements, operating_points, values_of
+from tirelib.model.base import operating_points, values_of
 from tirelib.model.state import State
 from tirelib.parameters import TireFile
 from tirelib.ring.compliance import compliance
@@ -282,9 +283,7 @@ class DynamicProblem:
         for _ in range(OUTER):
             values = self.values(x)
             if self.options.correct_edges:
-                self.correction = large_displacements(
-                    values, self.points, low_pass=self.runs.waves.low_pass
-                )
+                self.correction = large_displacements(values, self.points, self.runs.waves.low_pass)
             slope = self._slope(values)
             structure = STRUCTURE * TYPICAL_BIAS
             self.sigma = np.hypot(self.load_std, slope * np.hypot(EDGE_NOISE, OWN * structure))

@@ -17,11 +17,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from routes.correction import Correction, predict_with
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.contact.exact import load_exact
 from tirelib.errors import CalibrationError, ShapeError
 from tirelib.features.peaks import peak
-from tirelib.model.base import Correction, predict, smoothed
+from tirelib.model.base import predict, smoothed
 from tirelib.model.state import Operating
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID
@@ -240,7 +241,7 @@ def model_edges(
     stay those of the linear one: the bias then leads from a reading to the edges that the linear
     contact needs.
     """
-    state = predict(values, points, low_pass=low_pass, correction=correction)
+    state = predict_with(correction, values, points, low_pass=low_pass)
     assert state.contact is not None  # noqa: S101
     reading = read_edges(state.wave, low_pass=low_pass)
     return ModelEdges(state.contact.edges, reading, state.deflection)

@@ -17,7 +17,8 @@ from tirelib.brush.predict import PointConditions, predict_forces
 from tirelib.campaign import Run, RunPlan, write_campaign
 from tirelib.compare.forces import brush_of
 from tirelib.identify.force_data import ForceData
-from tirelib.model.base import large_displacements, predict, values_of
+from tirelib.model.base import values_of
+from tirelib.model.solution import solved
 from tirelib.parameters import Number, TireFile, write_tire
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID
@@ -42,9 +43,7 @@ def strain_runs(seed: int = 0, plant: float = 0.0, copies: int = 0) -> Iterable[
         conditions = (3 * plan())[:copies]
     at = points_of(conditions)
     values = values_of(model_file().tire)
-    correction = large_displacements(values, at, low_pass=NO_FILTER)
-    shown = predict(values, at, low_pass=NO_FILTER, correction=correction)
-    assert shown.waveform is not None
+    shown = solved(values, at, low_pass=NO_FILTER)
     waves = shown.waveform + bump(-0.1, 0.1, plant, 3000.0)(at.load, GRID)
     for i, (load, pressure, speed) in enumerate(conditions):
         omega = at.omega[i]

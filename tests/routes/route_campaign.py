@@ -9,7 +9,8 @@ from tirelib.arrays import FloatArray
 from tirelib.campaign import CampaignHeader, Tolerance
 from tirelib.campaign.model import TireGeometry
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
-from tirelib.model.base import large_displacements, operating_points, predict, values_of
+from tirelib.model.base import operating_points, predict, values_of
+from tirelib.model.solution import solved
 from tirelib.parameters import Number, Tire, TireFile, read_tire
 from tirelib.signal import LowPass
 from tirelib.waveforms import CONDITIONS, Waveforms
@@ -110,15 +111,16 @@ def waves(
         {},
     )
     points, values = operating_points(plain), values_of(of)
-    correction = large_displacements(values, points) if exact else None
-    state = predict(values, points, correction=correction)
-    assert state.waveform is not None
-    strain = state.waveform
+    linear = predict(values, points)
+    strain, deflection = linear.wave, linear.deflection
+    if exact:
+        whole = solved(values, points, low_pass=LowPass())
+        strain, deflection = whole.waveform, whole.deflection
     if damping:
         strain = damped_waveform(values, points, damping, law)
     shift = angle_std * random.standard_normal(n)
     strain = turned(strain, shift)[:, None, :] + noise * random.standard_normal((n, 3, 360))
-    radius = of.free_radius - state.deflection
+    radius = of.free_radius - deflection
     fields = {name: getattr(plain, name) for name in plain.__dataclass_fields__}
     measured = dict(plain.conditions) | {"loaded_radius": radius}
     return Waveforms(**(fields | {"strain": strain, "conditions": measured}))

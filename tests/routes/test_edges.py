@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from routes.correction import large_displacements
 from routes.edges import (
     bias_curve,
     corrected,
@@ -16,7 +17,7 @@ from routes.edges import (
 
 from tests.routes.route_campaign import SERIES, tire, turned, waves
 from tirelib.errors import CalibrationError, ShapeError
-from tirelib.model.base import large_displacements, operating_points, values_of
+from tirelib.model.base import operating_points, values_of
 
 LOADS = np.array([1700.0, 3400.0, 5100.0, 6800.0])
 
@@ -51,7 +52,7 @@ def test_the_bias_taken_off_leaves_the_edges_of_another_tire() -> None:
     data = waves(truth, SERIES)
     points = operating_points(data)
     low_pass = data.low_pass
-    correction = large_displacements(values_of(assumed), points, low_pass=low_pass)
+    correction = large_displacements(values_of(assumed), points, low_pass)
     bias = edge_bias(values_of(assumed), points, low_pass=low_pass, correction=correction)
     found = corrected(data.run.astype(float), read_edges(data.strain[:, 1]), bias, data.angle_std)
     edges = model_edges(values_of(truth), points).edges

@@ -15,7 +15,9 @@ from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.identify import estimated
 from tirelib.identify.waveform_fit import Prior, fit_waveforms
-from tirelib.model.base import BARE, FREE, large_displacements, values_of
+from tirelib.model.base import BARE, FREE, values_of
+from tirelib.model.solution import solved
+from tirelib.signal import LowPass
 
 pytestmark = pytest.mark.speed
 GOALS = {19: 3.0, 60: 10.0}
@@ -67,14 +69,14 @@ def test_growth_with_free_parameters(capsys: pytest.CaptureFixture[str]) -> None
     assert times[8] < 12.0 * times[1]
 
 
-def test_a_correction_from_a_solution_nearby(capsys: pytest.CaptureFixture[str]) -> None:
-    """What a refit of a diagnosis pays for large displacements, anew and from the last one."""
+def test_a_model_from_a_solution_nearby(capsys: pytest.CaptureFixture[str]) -> None:
+    """What a refit of a diagnosis pays for the model, anew and from the last solution."""
     points = campaign(60).data().points
     values = values_of(TIRE)
-    before = large_displacements(values, points)
+    before = solved(values, points, low_pass=LowPass())
     near = {**values, "tangential_stiffness": 1.02 * TIRE.tangential_stiffness}
-    anew = least(lambda: large_displacements(near, points))
-    again = least(lambda: large_displacements(near, points, start=before.contact))
+    anew = least(lambda: solved(near, points, low_pass=LowPass()))
+    again = least(lambda: solved(near, points, low_pass=LowPass(), start=before.rolling))
     with capsys.disabled():
-        print(f"correction of 60 runs: {anew:.3f} s anew, {again:.3f} s from one nearby")
+        print(f"model of 60 runs: {anew:.3f} s anew, {again:.3f} s from one nearby")
     assert again < 0.8 * anew

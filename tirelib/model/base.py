@@ -6,12 +6,10 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.contact import free_boundary
+from tirelib.contact.free_boundary import Start
 from tirelib.model.chain import Changes, waveform
-from tirelib.model.rolled import made_of
 from tirelib.model.state import Operating, State
 from tirelib.parameters import Tire
-from tirelib.rolling.solve import Rolling, Start, solve
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID, Waveforms
 
@@ -123,75 +121,11 @@ def predict(
     changes: Changes = (),
     *,
     low_pass: LowPass | None = None,
-    correction: "Correction | None" = None,
-    phi: FloatArray = GRID,
-) -> State:
-    """Return the solved state of the model at operating points."""
-    state = State.of(values, points, phi)
-    if correction is None:
-        return waveform(state, changes, low_pass=low_pass)
-    state = state.but(start=correction.start)
-    state = waveform(state, [("gage", correction.change), *changes], low_pass=low_pass)
-    return state.but(deflection=state.deflection + correction.deflection)
-
-
-@dataclass(frozen=True, slots=True)
-class Correction:
-    """Difference between the rolling and the linear ring, at fixed parameters.
-
-    Attributes
-    ----------
-    waveform : shape (n_points, n_phi), [-]
-    deflection : shape (n_points,), [m]
-    contact : Rolling or None
-        The solution behind it: a start for one nearby, and for slopes.
-    start : Start or None
-        Solution of the linear ring's contact.
-    """
-
-    waveform: FloatArray
-    deflection: FloatArray
-    contact: Rolling | None = None
-    start: free_boundary.Start | None = None
-
-    def change(self, state: State) -> State:
-        """Add the correction to a waveform."""
-        return state.but(waveform=state.wave + self.waveform)
-
-    def tiled(self, times: int) -> "Correction":
-        """Return the correction for points repeated one after the other."""
-        return Correction(
-            np.tile(self.waveform, (times, 1)),
-            np.tile(self.deflection, times),
-            start=self.start.tiled(times) if self.start else None,
-        )
-
-
-def large_displacements(
-    values: Mapping[str, float | FloatArray],
-    points: Operating,
-    *,
-    low_pass: LowPass | None = None,
     phi: FloatArray = GRID,
     start: Start | None = None,
-) -> Correction:
-    """Return the rolling ring less the linear one at a tire's values, both undamped.
-
-    It changes slowly with the parameters, so a fit brings it up to date a few times only; a
-    solution nearby for the same points as `start` saves most of the time and changes nothing else.
-    """
-    low_pass = low_pass or LowPass()
-    still = {**values, "damping": 0.0}
-    state = waveform(State.of(still, points, phi), low_pass=low_pass)
-    made = made_of(values, points)
-    solved = solve(made.constants, start=start)
-    strain = smoothed(solved.strain(made.gage, phi.size), points, low_pass)
-    return Correction(
-        strain - state.wave,
-        solved.deflection - state.deflection,
-        solved,
-        state.contact.start if state.contact else None,
-    )
+) -> State:
+    """Return the linear ring at operating points, solved; a contact nearby as start saves time."""
+    return waveform(State.of(values, points, phi).but(start=start), changes, low_pass=low_pass)
 
 
 def smoothed(strain: FloatArray, points: Operating, low_pass: LowPass) -> FloatArray:
@@ -232,13 +166,9 @@ def linearised(
     changes: Changes = (),
     *,
     low_pass: LowPass | None = None,
-    correction: Correction | None = None,
     step: float = 1e-4,
 ) -> Linear:
-    """Return the model and its slopes: one shifted copy per free coordinate, all in one batch.
-
-    A correction is held.
-    """
+    """Return the model and its slopes: one shifted copy per free coordinate, all in one batch."""
     n, k = len(points), len(free)
     columns = dict(values)
     for j, coordinate in enumerate(free):
@@ -247,13 +177,7 @@ def linearised(
         value = np.broadcast_to(np.asarray(values[coordinate.name], dtype=float), (n,))
         moved = np.broadcast_to(coordinate.moved(value, z), (k + 1, n))
         columns[coordinate.name] = np.ascontiguousarray(moved).ravel()
-    state = predict(
-        columns,
-        points.tiled(k + 1),
-        changes,
-        low_pass=low_pass,
-        correction=correction.tiled(k + 1) if correction else None,
-    )
+    state = predict(columns, points.tiled(k + 1), changes, low_pass=low_pass)
     waves = state.wave.reshape(k + 1, n, -1)
     depth = state.deflection.reshape(k + 1, n)
     by_wave, by_depth = (waves[1:] - waves[0]) / step, (depth[1:] - depth[0]) / step

@@ -6,7 +6,9 @@ import numpy as np
 
 from tests.synthetic import header
 from tirelib.arrays import FloatArray
-from tirelib.model.base import Operating, large_displacements, predict, smoothed, values_of
+from tirelib.identify.random_effects import angle_slope
+from tirelib.model.base import Operating, smoothed, values_of
+from tirelib.model.solution import solved
 from tirelib.parameters import TireFile, read_tire
 from tirelib.signal import LowPass
 from tirelib.waveforms import CONDITIONS, GRID, Waveforms
@@ -73,16 +75,9 @@ def waveforms(
     true = points_of(list(zip(load, pressure, nominal.speed, strict=True)))
     low_pass = LowPass()
     values = values_of(model_file().tire)
-    shown, depth = [], np.zeros(n)
-    for place in (0.0, ANGLE):
-        phi = GRID - place
-        correction = large_displacements(values, true, low_pass=low_pass, phi=phi)
-        state = predict(values, true, low_pass=low_pass, correction=correction, phi=phi)
-        assert state.waveform is not None
-        shown.append(state.waveform)
-        depth = state.deflection
-    slope = (shown[1] - shown[0]) / ANGLE
-    strain = shown[0] * (1.0 + TOLERANCE[2] * off[2])[:, None] - ANGLE * off[3][:, None] * slope
+    shown = solved(values, true, low_pass=low_pass)
+    strain, depth = shown.waveform * (1.0 + TOLERANCE[2] * off[2])[:, None], shown.deflection
+    strain = strain + ANGLE * off[3][:, None] * angle_slope(shown.waveform)
     if plant is not None:
         strain = strain + plant(nominal.load, GRID)
     gages = strain[:, None, :] + np.zeros((1, 5, 1))

@@ -8,7 +8,8 @@ from tests.synthetic import LATERAL, header
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Tolerance
 from tirelib.identify.random_effects import angle_slope
-from tirelib.model.base import large_displacements, predict, values_of
+from tirelib.model.base import values_of
+from tirelib.model.solution import solved
 from tirelib.model.state import Operating
 from tirelib.parameters import Tire
 from tirelib.signal import LowPass
@@ -58,12 +59,9 @@ def operating(load: FloatArray, pressure: FloatArray, speed: float = 18.0) -> Op
 
 
 def exact_waveform(tire: Tire, points: Operating) -> tuple[FloatArray, FloatArray]:
-    """Return waveform and deflection of the model with large displacements."""
-    values, low_pass = values_of(tire), LowPass()
-    fix = large_displacements(values, points, low_pass=low_pass)
-    state = predict(values, points, low_pass=low_pass, correction=fix)
-    assert state.waveform is not None
-    return state.waveform, state.deflection
+    """Return waveform and deflection of the model."""
+    found = solved(values_of(tire), points, low_pass=LowPass())
+    return found.waveform, found.deflection
 
 
 def made_waves(

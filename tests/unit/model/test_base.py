@@ -14,8 +14,6 @@ from tirelib.model import chain
 from tirelib.model.base import (
     FREE,
     Coordinate,
-    Correction,
-    large_displacements,
     linearised,
     move,
     predict,
@@ -76,30 +74,6 @@ def test_pressure_slopes_act_with_the_distance_from_the_reference_pressure() -> 
     for name in ("radial_pressure_slope", "tangential_pressure_slope"):
         k = [c.name for c in FREE].index(name)
         assert linear.waveform_slopes[k] == pytest.approx(0.0, abs=1e-12)
-
-
-def test_the_corrected_model_is_the_exact_one() -> None:
-    fix = large_displacements(VALUES, POINTS)
-    plain, both = predict(VALUES, POINTS), predict(VALUES, POINTS, correction=fix)
-    assert plain.waveform is not None
-    assert both.waveform == pytest.approx(plain.waveform + fix.waveform)
-    assert both.deflection == pytest.approx(plain.deflection + fix.deflection)
-
-
-def test_a_solution_nearby_as_start_changes_nothing() -> None:
-    near = large_displacements({**VALUES, "tangential_stiffness": 1.8e5}, POINTS)
-    assert near.contact is not None
-    warm = large_displacements(VALUES, POINTS, start=near.contact)
-    cold = large_displacements(VALUES, POINTS)
-    # Newton stops at a nanometre
-    assert warm.deflection == pytest.approx(cold.deflection, abs=2e-9)
-    assert warm.waveform == pytest.approx(cold.waveform, abs=1e-8)
-
-
-def test_tiled_corrections_stand_one_after_the_other() -> None:
-    twice = Correction(np.zeros((2, 3)), np.array([1.0, 2.0])).tiled(2)
-    assert twice.deflection.tolist() == [1.0, 2.0, 1.0, 2.0]
-    assert twice.waveform.shape == (4, 3)
 
 
 @given(st.integers(1, 30), st.floats(-3.0, 3.0))

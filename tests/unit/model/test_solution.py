@@ -5,12 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from routes.correction import large_displacements, predict_with
 
 from tests.unit.identify.model_waves import TIRE, operating
 from tirelib.arrays import FloatArray
 from tirelib.effects import CATALOGUE
 from tirelib.errors import ParameterError
-from tirelib.model.base import BARE, coordinates, large_displacements, move, predict, values_of
+from tirelib.model.base import BARE, coordinates, move, predict, values_of
 from tirelib.model.chain import Changes
 from tirelib.model.solution import (
     Solution,
@@ -143,8 +144,8 @@ def test_slopes_are_differences(effects: dict[str, float]) -> None:
 @pytest.mark.parametrize("case", CASES)
 def test_it_is_the_chain_with_the_correction_of_a_tire_without_effects(case: str) -> None:
     values, changes = CASES[case]
-    fix = replace(large_displacements(values, POINTS), start=None)  # both from the same start
-    state = predict(values, POINTS, changes, correction=fix)
+    fix = replace(large_displacements(values, POINTS, LOW_PASS), start=None)
+    state = predict_with(fix, values, POINTS, changes, low_pass=LOW_PASS)
     found = at(values, changes)
     assert found.waveform == pytest.approx(state.wave, abs=1e-10)
     assert found.deflection == pytest.approx(state.deflection, abs=1e-12)
