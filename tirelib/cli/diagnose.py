@@ -77,9 +77,8 @@ def diagnose(
     catalogue = registered_effects(effect_files)
     file = read_tire(model_name)
     campaign = read_campaign(folder)
-    forces = explains_forces(quantity, campaign, file)
     with progress_bar("diagnosing") as progress:
-        if forces:
+        if explains_forces(quantity, campaign, file):
             told, document = of_forces(campaign, file, catalogue, quantity, false_alarm, progress)
         else:
             told, document = _of_strain(campaign, file, catalogue, false_alarm, progress)
@@ -89,7 +88,9 @@ def diagnose(
     console = output()
     targets = [path for path in (json_file, out and out / "diagnosis.json") if path]
     if out is not None:
-        for path in _write(told, out, forces, file.extra.get("history", []), explanation.lines):
+        from tirelib.report.diagnosis import write_diagnosis
+
+        for path in write_diagnosis(told, document, out, file.extra.get("history", [])):
             console.print(f"written: {path}")
     for path in targets:
         write_json(path, document)
@@ -149,22 +150,6 @@ def of_forces(
     case = force_case(campaign, file, catalogue, quantity)
     told = assess_forces(case, list(catalogue.values()), false_alarm=false_alarm, progress=progress)
     return told, force_diagnosis_document(told)
-
-
-def _write(
-    told: Any,
-    out: Path,
-    forces: bool,
-    history: Sequence[Mapping[str, Any]],
-    lines: Sequence[tuple[str, str]],
-) -> Sequence[Path]:
-    if forces:
-        from tirelib.report.force_diagnosis import write_force_diagnosis
-
-        return write_force_diagnosis(told, out, lines)
-    from tirelib.report.diagnosis import write_diagnosis
-
-    return write_diagnosis(told, out, history, lines)
 
 
 def _say(document: dict[str, Any], lines: Sequence[tuple[str, str]]) -> None:

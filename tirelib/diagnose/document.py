@@ -15,6 +15,7 @@ from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.guess import Guess
 from tirelib.diagnose.held_out import Fold, fold_entry, folds, held_out_errors, pooled
 from tirelib.diagnose.left import Left, left_of, told_powers
+from tirelib.diagnose.told import candidate_told, verdict_told
 from tirelib.errors import TirelibError
 from tirelib.forked import forked
 
@@ -190,55 +191,26 @@ def diagnosis_document(told: Assessment) -> dict[str, Any]:
             )
         ],
         "delay_us": 1e6 * told.after.delay,
-        "false_alarm": found.verdict.alpha,
-        "misfit": found.verdict.best.statistic,
-        "misfit_floor": found.verdict.best.limit(found.verdict.alpha),
-        "misfit_of": found.verdict.best.against,
         "verdict": told.verdict,
         "named": list(told.named),
         "sets": [list(names) for names in found.verdict.sets] if told.named else [],
-        "p": found.verdict.best.p,
-        "p_std": found.verdict.best.p_std,
-        "p_without": found.verdict.base.p,
+        **verdict_told(found.verdict),
         "has": [effect.name for effect in found.base.effects],
-        "candidates": [_candidate(finding, k + 1, told) for k, finding in enumerate(told.findings)],
+        "candidates": [
+            candidate_told(
+                finding,
+                rank,
+                told.error_with(finding),
+                pooled(told.held_after.get(finding.effect.name, ()), told.folds),
+            )
+            for rank, finding in enumerate(told.findings, start=1)
+        ],
         "dead": list(found.dead),
         "dead_reasons": dict(found.dead),
         "unexplained": _unexplained(told),
         "next_test": next_test(told),
         "messages": list(told.messages),
     }
-
-
-def _candidate(finding: Finding, rank: int, told: Assessment) -> dict[str, Any]:
-    name = finding.effect.name
-    return {
-        "effect": name,
-        "title": finding.effect.title,
-        "rank": rank,
-        "score": finding.score,
-        "threshold": finding.threshold,
-        "level": finding.level,
-        "p": finding.p,
-        "p_std": finding.p_std,
-        "strength": _plain(finding.strength),
-        "std": _plain(finding.std),
-        "unit": finding.effect.unit,
-        "range": [finding.effect.low, finding.effect.high],
-        "in_range": finding.in_range,
-        "error_after": told.error_with(finding),
-        "heldout_error_after": pooled(told.held_after.get(name, ()), told.folds),
-        "share": finding.share,
-        "twins": [
-            {"effect": twin, "angle_deg": float(np.rad2deg(angle))} for twin, angle in finding.twins
-        ],
-        "power": finding.power,
-    }
-
-
-def _plain(strength: Sequence[float] | np.ndarray) -> float | list[float]:
-    numbers = [float(x) for x in strength]
-    return numbers[0] if len(numbers) == 1 else numbers
 
 
 def _left(found: Diagnosis, final: Fitted) -> Left:
@@ -253,14 +225,9 @@ def _left(found: Diagnosis, final: Fitted) -> Left:
     return replace(left, powers=powers, scaling=told_powers(powers))
 
 
-def exceeds(told: Assessment) -> bool:
-    """Return whether more is left than plain tires leave."""
-    return told.diagnosis.exceeds
-
-
 def _unexplained(told: Assessment) -> dict[str, Any]:
     left, guess = told.left, told.diagnosis.guess
-    if not exceeds(told):
+    if not told.diagnosis.exceeds:
         return {"where": None, "scaling": None, "guess": None}
     start, stop = np.rad2deg(left.span)
     return {

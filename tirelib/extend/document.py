@@ -7,8 +7,8 @@ import numpy as np
 
 from tirelib.compare.error import named_errors
 from tirelib.diagnose.held_out import fold_entry, pooled
+from tirelib.diagnose.told import strength_told
 from tirelib.extend.extension import Extension
-from tirelib.extend.model_file import plain
 from tirelib.extend.step import Step
 from tirelib.parameters import TireFile
 
@@ -108,8 +108,8 @@ def step_document(
         "action": done.action,
         "effect": done.effect.name,
         "title": done.effect.title,
-        "strength": plain(done.strength),
-        "std": plain(done.std),
+        "strength": strength_told(done.strength),
+        "std": strength_told(done.std),
         "unit": done.effect.unit,
         "range": [done.effect.low, done.effect.high],
         "in_range": "out_of_range" not in done.flags,

@@ -8,6 +8,7 @@ import numpy as np
 
 from tirelib import __version__
 from tirelib.diagnose.held_out import pooled
+from tirelib.diagnose.told import strength_told
 from tirelib.errors import FormatError
 from tirelib.extend.extension import Extension
 from tirelib.extend.step import Step
@@ -87,8 +88,8 @@ def history_entry(
     return {
         "action": done.action,
         "effect": done.effect.name,
-        "strength": plain(done.strength),
-        "std": plain(done.std),
+        "strength": strength_told(done.strength),
+        "std": strength_told(done.std),
         "unit": done.effect.unit,
         **{f"{name}{suffix}": value for name, value in errors.items() if np.isfinite(value)},
         "tirelib": __version__,
@@ -112,8 +113,8 @@ def stepped(
     effects = [
         {
             "effect": effect.name,
-            "strength": plain(done.after.strengths[k]),
-            "std": plain(done.after.strength_std(k)),
+            "strength": strength_told(done.after.strengths[k]),
+            "std": strength_told(done.after.strength_std(k)),
             "unit": effect.unit,
         }
         for k, effect in enumerate(done.after.effects)
@@ -166,12 +167,6 @@ def _number(old: Number | None, value: float, fit_std: float, factor: bool, sour
     if isinstance(interval, list) and len(interval) == 2:
         notes["interval_SI"] = [value + share * (float(end) - old.value) for end in interval]
     return Number(value, std, "fitted", source, notes)
-
-
-def plain(values: np.ndarray) -> float | list[float]:
-    """Return a strength as a number, or as a list if it has several components."""
-    numbers = [float(x) for x in values]
-    return numbers[0] if len(numbers) == 1 else numbers
 
 
 def written(number: Number) -> dict[str, Any]:

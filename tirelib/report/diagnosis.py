@@ -1,56 +1,58 @@
-"""The page of a diagnosis: one self-contained HTML file; and the same in Markdown."""
+"""The page of a diagnosis of strain or of forces: one HTML file; and the same in Markdown."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
 
-from tirelib.diagnose.document import Assessment, exceeds, next_test
-from tirelib.diagnose.held_out import pooled
-from tirelib.diagnose.left import Left, left_of
-from tirelib.report.comparison import METHOD, RING
-from tirelib.report.figures.compare_plot import (
-    ANGLE_TITLE,
-    Plot,
-    heat,
-    limit_of,
-    styled_figure,
-)
-from tirelib.report.figures.waterfall import waterfall_of
-from tirelib.report.findings import advice, dead_effects, score_bars
-from tirelib.report.page import Table, number, numbers
+from tirelib.diagnose.document import Assessment
+from tirelib.diagnose.forces.assess import ForceAssessment
+from tirelib.report.comparison import BRUSH, METHOD, RING
+from tirelib.report.explanation import fold_name, titled
+from tirelib.report.figures.compare_plot import Plot, styled_figure
+from tirelib.report.figures.force_left import force_maps
+from tirelib.report.figures.strain_left import strain_maps
+from tirelib.report.figures.waterfall import Step, waterfall, waterfall_of
+from tirelib.report.page import Table, number, numbers, unit_name
 from tirelib.report.parts_page import Part, write_parts_page
-from tirelib.waveforms import GRID
+from tirelib.report.style import BLUE, FAINT, RED
 
 TITLE = "Which effect is missing"
 METHOD_TEXT = (
-    "Every hypothesis - no effect, one, two or three - is fitted together with the tire's numbers. "
-    "What stands out beside it is compared with what plain tires show, tires of three simulators "
-    "in which nothing is hidden: the standard score of an effect is its likelihood ratio in units "
-    "of theirs. The p-value of a hypothesis is the share of plain tires with as large a score. "
-    "Every hypothesis with a p-value above the false-alarm probability stays in the set, and its "
-    "smallest members are the verdict. Scores in this table are those beside the model as it is; "
-    "the p-value is that of the hypothesis that this effect is missing and no other."
+    "Every hypothesis - no effect, one, two and more - is fitted together with the model's own "
+    "numbers. What stands out beside it is compared with what plain tires show, tires of several "
+    "simulators in which nothing is hidden: the standard score of an effect is its likelihood "
+    "ratio in units of theirs, and the threshold is the score that plain tires exceed with the "
+    "false-alarm probability. The p-value of a hypothesis is the share of plain tires with as "
+    "large a score. Every hypothesis with a p-value above the false-alarm probability stays in the "
+    "set, and its smallest members are the verdict. Scores in this table are those beside the "
+    "model as it is; the p-value is that of the hypothesis that this effect is missing and no "
+    "other. Named effects of a force stand in the order of what each alone gains on held-out "
+    "points."
 )
+LEAST_SHOWN = 0.01
+"""Left end of the logarithmic scale of scores."""
+_LEVELS = {"alarm": RED, "hint": BLUE, "quiet": FAINT}
 
 
 def write_diagnosis(
-    told: Assessment,
+    found: Assessment | ForceAssessment,
+    told: Mapping[str, Any],
     folder: Path,
     history: Sequence[Mapping[str, Any]],
-    lines: Sequence[tuple[str, str]],
 ) -> tuple[Path, Path]:
     """Write ``diagnosis.html`` and ``diagnosis.md``; return their paths.
 
     Parameters
     ----------
-    told : Assessment
+    found : Assessment or ForceAssessment
+    told : mapping
+        ``tirelib-diagnosis/1`` of it, with its explanation.
     folder : Path
     history : sequence of mapping
         History of the model, as its file holds it.
-    lines : sequence of (title, sentence)
-        The verdict in four lines (`tirelib.report.explanation`).
 
     Raises
     ------
@@ -60,175 +62,203 @@ def write_diagnosis(
     return write_parts_page(
         folder,
         "diagnosis",
-        parts_of(told, history),
-        title=TITLE,
-        summary=_summary(told),
-        messages=told.messages,
-        lines=lines,
+        parts_of(found, told, history),
+        title=f"{TITLE}: {told['quantity']}",
+        summary=_summary(found, told),
+        messages=told["messages"],
+        lines=titled(told["explanation"]),
     )
 
 
-def parts_of(told: Assessment, history: Sequence[Mapping[str, Any]] = ()) -> list[Part]:
+def parts_of(
+    found: Assessment | ForceAssessment,
+    told: Mapping[str, Any],
+    history: Sequence[Mapping[str, Any]] = (),
+) -> list[Part]:
     """Return the parts of the page."""
-    found = told.diagnosis
-    fall = waterfall_of(history, "strain")
-    before = left_of(told.refitted, found.problem.data.points)
-    plots = [_map(told, before, "before", "Without the named effects")]
-    if told.named:
-        plots.append(_map(told, told.left, "after", f"With {', '.join(told.named)}"))
+    if isinstance(found, ForceAssessment):
+        maps, sources = force_maps(found), list(BRUSH)
+    else:
+        maps, sources = strain_maps(found), [*RING, *METHOD]
+    effects = [*found.diagnosis.base.effects]
+    effects += [f.effect for f in found.findings if f.level != "quiet"]
+    shown = dict.fromkeys(f"{effect.name}: {effect.source}" for effect in effects)
     return [
         Part(
             "Candidates",
             "candidates",
             METHOD_TEXT,
             tables=[_candidates(told)],
-            plots=[score_bars(told.findings)],
+            plots=[_scores(told["candidates"])] if told["candidates"] else [],
         ),
-        Part("Error", "error", tables=[_errors(told)], plots=[fall] if fall else []),
-        Part("What is left", "left", _left_text(told), plots=plots),
+        Part("Error", "error", tables=[_errors(told)], plots=_falls(told, history)),
+        Part("What is left", "left", _left(told["unexplained"]), plots=maps),
         Part(
-            "Effects that this plan cannot show", "blind", tables=dead_effects(told.diagnosis.dead)
+            "Effects that this plan cannot show", "blind", tables=dead_effects(told["dead_reasons"])
         ),
-        Part("Next", "next", advice(next_test(told))),
-        Part("Sources", "sources", sources=_sources(told)),
+        Part("Next", "next", _advice(told["next_test"])),
+        Part("Sources", "sources", sources=[*shown, *sources]),
     ]
 
 
-def _summary(told: Assessment) -> str:
-    found = told.diagnosis
-    has = ", ".join(effect.name for effect in found.base.effects) or "none"
+def dead_effects(dead: Mapping[str, str]) -> list[Table]:
+    """Return the table of effects that the plan cannot show, if there are any."""
+    rows = [[name, reason] for name, reason in dead.items()]
+    return [Table("Dead effects", ["effect", "why"], rows, texts=2)] if rows else []
+
+
+def _summary(found: Assessment | ForceAssessment, told: Mapping[str, Any]) -> str:
+    if isinstance(found, ForceAssessment):
+        what = f"{told['quantity']} at {told['points']} points, axes ISO 8855"
+    else:
+        what = f"{len(found.diagnosis.runs.waves)} straight runs, strain"
     return (
-        f"Campaign {found.runs.waves.header.name}, {len(found.runs.waves)} straight runs, strain. "
-        f"Effects in the model: {has}. {len(told.findings)} effects were tried."
+        f"Campaign {told['campaign']}, {what}. Effects in the model: "
+        f"{', '.join(told['has']) or 'none'}. {len(told['candidates'])} effects were tried, "
+        f"{len(told['dead'])} cannot be shown by this plan."
     )
 
 
-def _unit(told: Assessment) -> str:
-    return "noise" if told.after.known else "microstrain"
-
-
-def _candidates(told: Assessment) -> Table:
-    unit = _unit(told)
+def _candidates(told: Mapping[str, Any]) -> Table:
+    unit = unit_name(told["error_unit"])
     return Table.of(
         "Effects by rank",
-        told.findings,
+        told["candidates"],
         {
-            "effect": lambda f: f.effect.name,
-            "level": lambda f: f.level,
-            "in range": lambda f: "yes" if f.in_range else "no",
-            "twins (angle)": lambda f: ", ".join(
-                f"{twin} {np.rad2deg(angle):.0f}\u00b0" for twin, angle in f.twins
+            "effect": lambda entry: entry["effect"],
+            "level": lambda entry: entry["level"],
+            "in range": lambda entry: "yes" if entry["in_range"] else "no",
+            "twins (angle)": lambda entry: ", ".join(
+                f"{twin['effect']} {twin['angle_deg']:.0f}\u00b0" for twin in entry["twins"]
             ),
-            "score / threshold": lambda f: number(f.score / f.threshold, 3),
-            "p": lambda f: number(f.p, 2),
-            "strength": lambda f: numbers(f.strength),
-            "std": lambda f: numbers(f.std),
-            "unit": lambda f: f.effect.unit,
-            f"error with it [{unit}]": lambda f: number(told.error_with(f), 3),
-            f"held out [{unit}]": lambda f: number(
-                pooled(told.held_after.get(f.effect.name, ()), told.folds), 3
-            ),
-            "power": lambda f: number(f.power, 2),
+            "score / threshold": lambda entry: number(entry["score"] / entry["threshold"], 3),
+            "p": lambda entry: number(entry["p"], 2),
+            "strength": lambda entry: numbers(np.atleast_1d(entry["strength"])),
+            "std": lambda entry: numbers(np.atleast_1d(entry["std"])),
+            "unit": lambda entry: entry["unit"],
+            f"error with it alone [{unit}]": lambda entry: number(entry["error_after"], 3),
+            f"held out [{unit}]": lambda entry: number(entry["heldout_error_after"], 3),
+            "power": lambda entry: number(entry["power"], 2),
         },
         texts=4,
-        note="Twins: effects whose signatures are less than 30 degrees apart. Power: chance that "
-        "a third of the range has a score beyond the threshold. Errors with "
-        "effects that are not named are linear approximations.",
+        note="Twins: effects whose signatures are less than 30 degrees apart. Power: chance that a "
+        "third of the range has a score beyond the threshold. Errors with effects that are not "
+        "named are linear approximations. Held out: for named effects only.",
     )
 
 
-def _errors(told: Assessment) -> Table:
-    verdict, unit = told.diagnosis.verdict, _unit(told)
-    best = verdict.best
-    limit = best.limit(verdict.alpha)
-    rows = [
+def _scores(candidates: Sequence[Mapping[str, Any]]) -> Plot:
+    """Return the scores over their thresholds."""
+    names = [entry["effect"] for entry in candidates]
+    ratio = [entry["score"] / entry["threshold"] for entry in candidates]
+    figure = go.Figure(
+        go.Bar(
+            x=np.maximum(np.round(ratio, 4), LEAST_SHOWN),
+            y=names,
+            orientation="h",
+            marker={"color": [_LEVELS[entry["level"]] for entry in candidates]},
+            hovertemplate="%{y}: %{x:.3g}<extra></extra>",
+        )
+    )
+    figure.add_vline(x=1.0, line={"dash": "dot", "color": FAINT})
+    # the place of an annotation on an axis of powers is a power
+    figure.add_annotation(
+        x=0.0, y=1.0, yref="paper", yanchor="bottom", text="threshold", showarrow=False
+    )
+    figure.update_yaxes(autorange="reversed")
+    figure.update_xaxes(title="score / threshold", type="log")
+    styled_figure(figure, 160 + 22 * len(names), showlegend=False)
+    return Plot(
+        "scores",
+        "Score over threshold",
+        "Red: alarm; blue: hint; gray: quiet. A gray effect beyond the threshold is not needed "
+        "where what is named is fitted.",
+        figure,
+        ["effect", "score / threshold", "level"],
         [
-            "noise of a run's waveform, from repeats [microstrain]",
-            number(1e6 * told.before.noise, 3),
+            [entry["effect"], each, entry["level"]]
+            for entry, each in zip(candidates, ratio, strict=True)
         ],
-        [f"error of the given model [{unit}]", number(told.before.value, 4)],
-        [f"error with its parameters fitted again [{unit}]", number(told.refitted.value, 4)],
-        [f"error with the named effects [{unit}]", number(told.after.value, 4)],
+    )
+
+
+def _errors(told: Mapping[str, Any]) -> Table:
+    unit, raw = unit_name(told["error_unit"]), unit_name(told["residual_rms_unit"])
+    rows = [
+        [f"noise, from {told['repeats']} repeats [{raw}]", number(told["noise"], 3)],
+        [f"error of the given model [{unit}]", number(told["error_before"], 4)],
+        [f"error with its parameters fitted again [{unit}]", number(told["error_refitted"], 4)],
+        [f"error with the named effects [{unit}]", number(told["error_after"], 4)],
         [
             f"floor: the error that noise and what plain tires show explain [{unit}]",
-            number(told.floor, 4),
+            number(told["floor"], 4),
         ],
         [
             "unweighted rms of model minus measurement, as given and with the named effects "
-            "[microstrain]",
-            f"{number(1e6 * told.before.rms, 4)}; {number(1e6 * told.after.rms, 4)}",
+            f"[{raw}]",
+            f"{number(told['residual_rms_before'], 4)}; {number(told['residual_rms_after'], 4)}",
         ],
         [
             "largest standard score beside the verdict's model, and the score that plain tires "
             "exceed with the false-alarm probability",
-            f"{number(best.statistic, 3)} ({best.against}); {number(limit, 3)}",
+            f"{number(told['misfit'], 3)} ({told['misfit_of']}); {number(told['misfit_floor'], 3)}",
         ],
-    ]
-    for k, fold in enumerate(told.folds):
-        after = [
-            f"{name}: {number(errors[k], 3)}" for name, errors in told.held_after.items() if errors
-        ]
-        rows.append(
+        *(
             [
-                f"highest {fold.name} left out of the fit ({int(fold.out.sum())} runs): "
-                f"error there without, and with one effect [{unit}]",
-                f"{number(told.held_before[k], 3)}; {', '.join(after)}",
+                f"left out of the fit: {fold_name(fold)}, error there without and with the named "
+                f"effects [{unit}]",
+                f"{number(fold['error_before'], 3)}; {number(fold['error_after'], 3)}",
             ]
-        )
+            for fold in told["held_out"]
+        ),
+    ]
     return Table("Errors", ["", "value"], rows)
 
 
-def _left_text(told: Assessment) -> str:
-    guess = told.diagnosis.guess
-    if not exceeds(told):
-        return "The remaining residual is no larger than what plain tires show."
-    text = (
-        f"The residual that plain tires do not show lies {told.left.where}; it {told.left.scaling}."
-    )
-    if guess is not None:
-        text += (
-            f" A guess by sparse regression, measured less model: {guess.law} "
-            f"({100 * guess.explained:.0f} % of it on left-out conditions). A guess, not a law."
+def _falls(told: Mapping[str, Any], history: Sequence[Mapping[str, Any]]) -> list[Plot]:
+    """Return the error's fall with the named effects, and across the model's history."""
+    plots = []
+    if told.get("steps"):
+        first = Step("base", told["error_refitted"], told["heldout_error_before"])
+        steps = [Step(s["effect"], s["error"], s["heldout_error"]) for s in told["steps"]]
+        plots.append(
+            waterfall(
+                [first, *steps],
+                unit_name(told["error_unit"]),
+                told["floor"],
+                "fall",
+                "Error as the named effects are added one after the other",
+            )
         )
+    before = waterfall_of(history, told["quantity"])
+    return plots if before is None else [*plots, before]
+
+
+def _left(unexplained: Mapping[str, Any]) -> str:
+    where, scaling, guess = (unexplained[key] for key in ("where", "scaling", "guess"))
+    if where is None:
+        return "The remaining residual is no larger than what plain tires show."
+    if isinstance(where, Mapping):
+        where, scaling = where["text"], scaling["text"]
+    text = f"The residual that plain tires do not show lies {where}; it {scaling}."
+    if isinstance(guess, Mapping):
+        text += (
+            f" A guess by sparse regression, measured less model: {guess['law']} "
+            f"({100 * guess['explained_held_out']:.0f} % of it on left-out conditions). A guess, "
+            "not a law."
+        )
+    elif guess:
+        text += f" A guess at its law: {guess}."
     return text
 
 
-def _sources(told: Assessment) -> list[str]:
-    shown = [f.effect for f in told.findings if f.level != "quiet" or f.effect.name in told.named]
-    return [*(f"{effect.name}: {effect.source}" for effect in shown), *RING, *METHOD]
-
-
-def _map(told: Assessment, left: Left, name: str, title: str) -> Plot:
-    points, run = told.diagnosis.problem.data.points, told.diagnosis.runs.waves.run
-    order = np.lexsort((points.speed, points.pressure, np.round(points.load, -2)))
-    data = left.white[order]
-    unit = _unit(told)
-    limit = limit_of(told.refitted.white_of(told.refitted.rest))
-    degrees = np.rad2deg(GRID)
-    figure = heat(
-        np.round(data, 2),
-        np.round(degrees, 2),
-        limit,
-        unit,
-        hovertemplate="%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>",
-    )
-    figure.update_xaxes(title=ANGLE_TITLE, range=[-180, 180], dtick=30)
-    marks = list(range(0, len(order), max(1, len(order) // 10)))
-    figure.update_yaxes(
-        title="runs, by load",
-        tickvals=marks,
-        showgrid=False,
-        ticktext=[f"run {run[order[k]]}: {points.load[order[k]]:.0f} N" for k in marks],
-    )
-    styled_figure(figure, 480)
-    labels = [f"run {run[k]}: {points.load[k]:.0f} N [{unit}]" for k in order]
-    rows = [[round(float(a), 3), *np.round(data[:, j], 3).tolist()] for j, a in enumerate(degrees)]
-    return Plot(
-        f"residual-{name}",
-        title,
-        "Model minus measurement, with set-point errors weighted down as in the fit. One colour "
-        "scale for both maps. Red: the model shows too much tension; blue: too much compression.",
-        figure,
-        ["wheel angle [deg]", *labels],
-        rows,
-    )
+def _advice(step: Mapping[str, Any]) -> str:
+    """Return the next test of a document in words."""
+    text = f"{step['what'][0].upper()}{step['what'][1:]}."
+    revived = step["would_revive"]
+    if revived:
+        text += (
+            f" Other runs would show {', '.join(revived)}: see the effects that this plan cannot "
+            "show."
+        )
+    return text

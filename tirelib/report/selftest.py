@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from tirelib.report.diagnosis import dead_effects
 from tirelib.report.figures.compare_plot import Plot, styled_figure
-from tirelib.report.findings import dead_effects
 from tirelib.report.page import DASH, Table, number
 from tirelib.report.parts_page import Part, write_parts_page
 

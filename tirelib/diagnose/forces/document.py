@@ -3,12 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from tirelib.compare.forces import UNITS
-from tirelib.diagnose.diagnose import Finding
 from tirelib.diagnose.forces.assess import ForceAssessment
-from tirelib.diagnose.forces.held_out import BLOCK, ForceFold, pooled
+from tirelib.diagnose.forces.held_out import ForceFold, pooled
+from tirelib.diagnose.told import candidate_told, verdict_told
 from tirelib.units import from_si
 
 FORMAT = "tirelib-diagnosis/1"
@@ -23,7 +21,7 @@ CONDITION_UNITS = {
 
 def force_diagnosis_document(told: ForceAssessment) -> dict[str, Any]:
     """Return the numbers; errors are in the noise of a point, in N or Nm without repeats."""
-    found, case, judged = told.diagnosis, told.case, told.diagnosis.verdict
+    found, case = told.diagnosis, told.case
     factor = case.factor
     held_final = found.held_final if told.named else found.held_before
     return {
@@ -53,18 +51,17 @@ def force_diagnosis_document(told: ForceAssessment) -> dict[str, Any]:
             {"effect": name, "error": factor * error, "heldout_error": factor * held}
             for name, error, held in (found.steps if told.named else ())
         ],
-        "false_alarm": judged.alpha,
-        "misfit": judged.best.statistic,
-        "misfit_floor": judged.best.limit(judged.alpha),
-        "misfit_of": judged.best.against,
         "verdict": told.verdict,
         "named": list(told.named),
         "sets": [list(names) for names in told.sets],
-        "p": judged.best.p,
-        "p_std": judged.best.p_std,
-        "p_without": judged.base.p,
+        **verdict_told(found.verdict),
         "has": [effect.name for effect in found.base.effects],
-        "candidates": [_candidate(finding, k + 1, told) for k, finding in enumerate(told.findings)],
+        "candidates": [
+            candidate_told(
+                finding, rank, factor * found.error_with(finding), factor * found.held_with(finding)
+            )
+            for rank, finding in enumerate(told.findings, start=1)
+        ],
         "dead": list(found.dead),
         "dead_reasons": dict(found.dead),
         "unexplained": _unexplained(told),
@@ -95,55 +92,8 @@ def fold_value(fold: ForceFold) -> tuple[float, str]:
     return float(from_si(fold.value, unit, dimension)), unit
 
 
-def fold_words(fold: ForceFold) -> str:
-    """Say what was left out."""
-    if fold.name == "time":
-        return f"part {fold.value + 1:.0f} of the time, blocks of {BLOCK:g} s"
-    value, unit = fold_value(fold)
-    if fold.name == "cell":
-        return f"part {value:.0f} of the cells of conditions"
-    return f"{fold.name} {value:.4g} {unit}"
-
-
-def _candidate(finding: Finding, rank: int, told: ForceAssessment) -> dict[str, Any]:
-    factor = told.case.factor
-    return {
-        "effect": finding.effect.name,
-        "title": finding.effect.title,
-        "rank": rank,
-        "score": finding.score,
-        "threshold": finding.threshold,
-        "level": finding.level,
-        "p": finding.p,
-        "p_std": finding.p_std,
-        "strength": plain(finding.strength),
-        "std": plain(finding.std),
-        "unit": finding.effect.unit,
-        "range": [finding.effect.low, finding.effect.high],
-        "in_range": finding.in_range,
-        "error_after": factor * told.diagnosis.error_with(finding),
-        "heldout_error_after": factor * told.diagnosis.held_with(finding),
-        "share": finding.share,
-        "twins": [
-            {"effect": twin, "angle_deg": float(np.rad2deg(angle))} for twin, angle in finding.twins
-        ],
-        "power": finding.power,
-    }
-
-
-def plain(strength: Sequence[float] | np.ndarray) -> float | list[float]:
-    """Return a strength as a number, or as a list if it has several components."""
-    numbers = [float(x) for x in strength]
-    return numbers[0] if len(numbers) == 1 else numbers
-
-
-def exceeds(told: ForceAssessment) -> bool:
-    """Return whether more is left than plain tires leave."""
-    return told.verdict in ("unknown", "form_inadequate")
-
-
 def _unexplained(told: ForceAssessment) -> dict[str, Any]:
-    left, beyond = told.left, exceeds(told)
+    left, beyond = told.left, told.verdict in ("unknown", "form_inadequate")
     return {
         "where": left.where if beyond else None,
         "scaling": left.scaling if beyond else None,

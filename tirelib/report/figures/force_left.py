@@ -21,7 +21,15 @@ DIGITS = {"N": "z,.0f", "bar": "z.2f", "deg": "z.1f", "km/h": "z.0f"}
 _BINS = 24
 
 
-def residual_map(assessment: ForceAssessment, model: ForceFit, name: str, title: str) -> Plot:
+def force_maps(found: ForceAssessment) -> list[Plot]:
+    """Return the map without the named effects and, where there are some, with them."""
+    maps = [_map(found, found.diagnosis.base, "before", "Without the named effects")]
+    if found.named:
+        maps.append(_map(found, found.final, "after", f"With {', '.join(found.named)}"))
+    return maps
+
+
+def _map(assessment: ForceAssessment, model: ForceFit, name: str, title: str) -> Plot:
     """Return the mean of model less measured by slip and by set point of the other conditions."""
     case = assessment.case
     at, unit = case.problem.bench.conditions, case.unit
