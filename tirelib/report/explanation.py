@@ -96,42 +96,19 @@ def _sure(told: Mapping[str, Any]) -> str:
             "This is open: no set point was measured twice, so the noise is unknown and nothing is "
             "named."
         )
-    return " ".join([*_evidence(told), *_alternatives(told), *_blind(told)])
+    return " ".join([_by_p(told), *_doubts(told), *_alternatives(told), *_blind(told)])
 
 
-def _evidence(told: Mapping[str, Any]) -> list[str]:
-    """Return how significant a verdict is, by p-values where the document has them."""
-    found = [_candidate(told, name) for name in told["named"]]
-    entries = [entry for entry in found if entry is not None]
+def _doubts(told: Mapping[str, Any]) -> list[str]:
+    """Return a sentence for each named effect whose strength is not plausible."""
     out = []
-    for entry in entries:
+    for entry in filter(None, (_candidate(told, name) for name in told["named"])):
         low, high = (number(end, 3) for end in entry["range"])
         if not entry["in_range"]:
             out.append(
                 f"The strength of {entry['effect']} is outside the plausible {low} to {high}: "
                 "measure it in another way before you believe it."
             )
-    if told.get("p") is not None:
-        return [_by_p(told), *out]
-    ratios = []
-    if told["verdict"] != "unknown":
-        for entry in entries:
-            ratio = entry["score"] / entry["threshold"]
-            ratios.append(f"{entry['effect']} {float(f'{ratio:.2g}'):g} times")
-    if ratios:
-        return [
-            f"{_and(ratios)} as clear as the clearest effect that variants of the model show by "
-            "chance and structure alone.",
-            *out,
-        ]
-    largest = max((e["score"] / e["threshold"] for e in told["candidates"]), default=0.0)
-    if told["verdict"] == "none":
-        out.append(
-            f"The most conspicuous effect reaches {number(largest, 2)} times what variants of "
-            "the model without it show, or no fit needs it."
-        )
-    elif not told["named"]:
-        out.append("More is left than the structure of a tire explains.")
     return out
 
 
@@ -177,7 +154,7 @@ def _alternatives(told: Mapping[str, Any]) -> list[str]:
     """Return a sentence on other effects that explain the measurements equally well."""
     if told["verdict"] == "indistinguishable":
         return ["They explain these measurements equally well."]
-    sets = told.get("sets") or []
+    sets = told["sets"]
     if len(sets) > 1:
         listed = "; or ".join(_other(names, sets[0]) for names in sets[1 : 1 + SHOWN])
         return [f"Not ruled out: {listed}."]
