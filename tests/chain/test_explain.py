@@ -73,6 +73,13 @@ def strain(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 @pytest.fixture(scope="module")
+def planted(strain: Any) -> Any:
+    """What the journey's `tirelib diagnose` wrote."""
+    told = json.loads((strain.out / "diagnosis.json").read_text())
+    return SimpleNamespace(told=told, out=strain.out / "diagnosed")
+
+
+@pytest.fixture(scope="module")
 def forces(tmp_path_factory: pytest.TempPathFactory) -> Any:
     folder = tmp_path_factory.mktemp("forces")
     campaign = write_forces(folder / "steady", steady_runs(slope=0.25), "steady")
@@ -90,6 +97,82 @@ def test_what_was_planted_is_named_added_and_the_error_falls(strain: Any) -> Non
     (effect,) = read_tire(told["steps"][-1]["model"]).extra["effects"]
     assert effect["effect"] == EFFECT
     assert effect["strength"] == pytest.approx(STRENGTH, abs=0.05)
+
+
+def test_the_diagnosis_has_the_contracts_keys(planted: Any) -> None:
+    told = planted.told
+    assert told["format"] == "tirelib-diagnosis/1"
+    assert told["quantity"] == "strain"
+    assert {
+        "noise",
+        "floor",
+        "error_before",
+        "verdict",
+        "named",
+        "sets",
+        "false_alarm",
+        "candidates",
+        "dead",
+        "unexplained",
+        "next_test",
+    } <= set(told)
+    assert set(told["unexplained"]) >= {"where", "scaling"}
+    for entry in told["candidates"]:
+        assert set(entry) >= {
+            "effect",
+            "rank",
+            "score",
+            "threshold",
+            "level",
+            "strength",
+            "std",
+            "in_range",
+            "error_after",
+            "heldout_error_after",
+            "twins",
+            "power",
+            "p",
+            "p_std",
+        }
+    assert [entry["rank"] for entry in told["candidates"]] == list(
+        range(1, len(told["candidates"]) + 1)
+    )
+
+
+def test_the_planted_effect_is_named_with_errors_that_fall(planted: Any) -> None:
+    told = planted.told
+    assert told["verdict"] in ("named", "form_inadequate")
+    assert told["named"] == [EFFECT]
+    first = told["candidates"][0]
+    assert first["effect"] == EFFECT
+    assert first["level"] == "alarm"
+    assert first["score"] > first["threshold"]
+    assert told["p_without"] <= told["false_alarm"] == 0.05
+    assert told["sets"] == [[EFFECT]]
+    assert first["error_after"] == told["error_after"] < 0.5 * told["error_before"]
+    assert told["error_after"] < told["error_refitted"] < told["error_before"]
+    assert first["heldout_error_after"] < told["heldout_error_before"]
+    assert all(entry["heldout_error_after"] is None for entry in told["candidates"][1:])
+
+
+def test_dead_effects_are_names_with_reasons(planted: Any) -> None:
+    told = planted.told
+    assert told["dead_reasons"]["camber"] == "no run has a camber"
+    assert told["dead"] == list(told["dead_reasons"])
+    assert not set(told["dead"]) & {entry["effect"] for entry in told["candidates"]}
+
+
+def test_the_diagnosis_is_one_page_and_the_same_in_words(planted: Any) -> None:
+    page = (planted.out / "diagnosis.html").read_text()
+    words = (planted.out / "diagnosis.md").read_text()
+    assert json.loads((planted.out / "diagnosis.json").read_text()) == planted.told
+    assert 'src="http' not in page
+    for plot in ("scores", "residual-before", "residual-after"):
+        assert f'id="plot-{plot}"' in page
+    for text in (EFFECT, "Dead effects", "no run has a camber"):
+        assert text in page
+        assert text in words
+    assert not (planted.out / "index.html").exists()
 
 
 def test_forces_make_the_same_journey(forces: Any) -> None:

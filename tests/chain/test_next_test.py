@@ -17,6 +17,7 @@ from tests.chain.test_diagnose import Folder
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
 from tirelib import waveforms
 from tirelib.cli import program
+from tirelib.effects import CATALOGUE
 from tirelib.errors import TirelibError
 from tirelib.parameters import write_tire
 from tirelib.waveforms import Waveforms
@@ -51,10 +52,22 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+FEW = {
+    name: CATALOGUE[name]
+    for name in (EFFECT, "temperature", "sidewall_damping", "low_pass", "camber")
+}
+"""Effects enough for a plan; its time goes with their number."""
+
+
+def few_effects(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr("tirelib.model.registration.registered_effects", lambda files: FEW)
+
+
 @pytest.fixture(scope="module")
 def planned(model: Path) -> Any:
     with pytest.MonkeyPatch.context() as patch:
         use(patch, waves(EFFECT, STRENGTH))
+        few_effects(patch)
         out, target = model.parent / "next", model.parent / "N.json"
         found = call(
             "next-test",
@@ -194,6 +207,7 @@ def judged(model: Path) -> Any:
     out, target = model.parent / "judged", model.parent / "S.json"
     with pytest.MonkeyPatch.context() as patch:
         use(patch, waves(EFFECT, STRENGTH))
+        few_effects(patch)
         found = call(
             "selftest",
             "x",
