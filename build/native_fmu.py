@@ -3,11 +3,11 @@
     pip install ziglang==0.17.1
     python build/native_fmu.py
 
-The core and the functions of FMI 2.0 and 3.0 (``fmu_src/core``, ``slave``, ``fmi2``, ``fmi3``) are
-compiled for every platform into ``fmu_src/binaries``, one folder a platform, named as FMI 2.0 names
-them; the gate before pythonfmu's library (``fmu_src/gate``) for Linux. The compiler comes with the
-C libraries of all of them: glibc 2.17 or newer, Windows with the UCRT (10 and newer), macOS 11 or
-newer on both kinds of Mac.
+The estimator, the virtual tire and the functions of FMI 2.0 and 3.0 (``fmu_src/core``, ``tire``,
+``slave``, ``fmi2``, ``fmi3``) become one library for every platform in ``fmu_src/binaries``, whose
+folders are named as FMI 2.0 names them; the gate before pythonfmu's library (``fmu_src/gate``) is
+for Linux. The compiler comes with the C libraries of all of them: glibc 2.17 or newer, Windows with
+the UCRT (10 and newer), macOS 11 or newer on both kinds of Mac.
 """
 
 import hashlib
@@ -76,7 +76,7 @@ class Binary:
         return parts[0][1] if len(parts) == 1 else universal(parts)
 
 
-_CORE = ("core", "slave", "fmi2", "fmi3")
+_CORE = ("core", "tire", "slave", "fmi2", "fmi3")
 BINARIES = {
     "binaries/linux64/StrainTire.so": Binary(
         _CORE, (*CORE, *LINUX), ("x86_64-linux-gnu.2.17",), ("-lm",)

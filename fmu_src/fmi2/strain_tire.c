@@ -184,7 +184,8 @@ FMI2_EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state
                                              size_t n) {
     const SlaveState *kept = state;
     if (!c || !kept) return fmi2Error;
-    if (n < kept->n) return (fmi2Status)slave_failed(c, "the state needs %lu bytes", (unsigned long)kept->n);
+    if (n < kept->n)
+        return (fmi2Status)slave_failed(c, "the state needs %lu bytes", (unsigned long)kept->n);
     memcpy(b, kept->bytes, kept->n);
     return fmi2OK;
 }
@@ -202,8 +203,8 @@ FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte b
 }
 
 FMI2_EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference u[],
-                                                    size_t m, const fmi2ValueReference r[], size_t n,
-                                                    const fmi2Real d[], fmi2Real v[]) {
+                                                    size_t m, const fmi2ValueReference r[],
+                                                    size_t n, const fmi2Real d[], fmi2Real v[]) {
     (void)c, (void)u, (void)m, (void)r, (void)n, (void)d, (void)v;
     return fmi2Error;
 }

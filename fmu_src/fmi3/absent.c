@@ -7,9 +7,9 @@
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
-#define ABSENT(name, ...) \
+#define ABSENT(name, ...)                                                                          \
     FMI3_EXPORT fmi3Status name(fmi3Instance c, __VA_ARGS__) { return fmi3Error; }
-#define ABSENT_ALONE(name) \
+#define ABSENT_ALONE(name)                                                                         \
     FMI3_EXPORT fmi3Status name(fmi3Instance c) { return fmi3Error; }
 #define REFERENCES const fmi3ValueReference r[], size_t n
 
@@ -53,7 +53,8 @@ ABSENT(fmi3SetIntervalDecimal, REFERENCES, const fmi3Float64 v[])
 ABSENT(fmi3SetIntervalFraction, REFERENCES, const fmi3UInt64 counters[],
        const fmi3UInt64 resolutions[])
 ABSENT(fmi3SetShiftDecimal, REFERENCES, const fmi3Float64 v[])
-ABSENT(fmi3SetShiftFraction, REFERENCES, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+ABSENT(fmi3SetShiftFraction, REFERENCES, const fmi3UInt64 counters[],
+       const fmi3UInt64 resolutions[])
 
 ABSENT_ALONE(fmi3EnterContinuousTimeMode)
 ABSENT(fmi3CompletedIntegratorStep, fmi3Boolean kept, fmi3Boolean *event, fmi3Boolean *end)

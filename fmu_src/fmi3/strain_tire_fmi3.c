@@ -41,7 +41,8 @@ FMI3_EXPORT fmi3Instance fmi3InstantiateCoSimulation(
     c->log = log;
     c->events = events;
     c->slave = slave_make(&FMI3, c, name, token, resources, NULL);
-    if (c->slave) return c;
+    if (c->slave && c->slave->model == &STRAIN_MODEL) return c;
+    if (c->slave) slave_free(c->slave);
     free(c);
     return NULL;
 }
@@ -131,8 +132,10 @@ FMI3_EXPORT fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 now, fmi3Fl
         return (fmi3Status)slave_failed(c->slave, "a step in Event Mode; call enterStepMode first");
     if (slave_step(c->slave, step)) return fmi3Error;
     *reached = c->time = now + step;
-    if (c->events) *event = slave_turn(c->slave) != c->slave->announced;
-    else c->slave->announced = slave_turn(c->slave);
+    if (c->events)
+        *event = slave_turn(c->slave) != c->slave->announced;
+    else
+        c->slave->announced = slave_turn(c->slave);
     return fmi3OK;
 }
 
@@ -174,8 +177,9 @@ FMI3_EXPORT fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueRefere
     if (!c) return fmi3Error;
     for (size_t i = 0; i < n; i++) {
         if (r[i] != c->slave->count)
-            return (fmi3Status)slave_failed(c->slave, "TypeError: value reference %u is no clock; "
-                                                      "that of turn_ended is %u",
+            return (fmi3Status)slave_failed(c->slave,
+                                            "TypeError: value reference %u is no clock; "
+                                            "that of turn_ended is %u",
                                             (unsigned)r[i], (unsigned)c->slave->count);
         v[i] = c->event_mode && slave_turn(c->slave) != c->slave->announced;
     }
@@ -199,8 +203,10 @@ static int allowed(Slave *s, const fmi3ValueReference r[], size_t n, size_t valu
     for (size_t i = 0; i < n; i++) {
         size_t own = r[i] < s->count ? span(s, r[i]) : 1;
         if (!own) {
-            slave_failed(s, "value reference = %u; this is an element of an array; use the "
-                            "reference of the array", (unsigned)r[i]);
+            slave_failed(s,
+                         "value reference = %u; this is an element of an array; use the "
+                         "reference of the array",
+                         (unsigned)r[i]);
             return 0;
         }
         if (!slave_allowed(s, r[i], kind, set)) return 0;
@@ -333,7 +339,8 @@ FMI3_EXPORT fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3
     Instance *c = instance;
     if (!c || !b || !state) return fmi3Error;
     SlaveState *kept = malloc(sizeof *kept + n);
-    if (!kept) return (fmi3Status)slave_failed(c->slave, "MemoryError: %lu bytes", (unsigned long)n);
+    if (!kept)
+        return (fmi3Status)slave_failed(c->slave, "MemoryError: %lu bytes", (unsigned long)n);
     kept->n = n;
     memcpy(kept->bytes, b, n);
     free(*state);

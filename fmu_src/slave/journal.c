@@ -20,8 +20,9 @@ void slave_complain(Slave *s, const char *cause) {
     while (i < s->causes && i < CAUSES && s->told[i] != h) i++;
     if (i == CAUSES) {
         if (s->causes++ == CAUSES)
-            slave_tell(s, "50 different causes were reported; further causes are not reported until a "
-                    "reset");
+            slave_tell(s,
+                       "50 different causes were reported; further causes are not reported until a "
+                       "reset");
         if (s->causes > CAUSES + 1) s->causes = CAUSES + 1;
         return;
     }

@@ -10,6 +10,8 @@
 
 static const char FORMAT[] = "tirelib-core/1";
 
+static const char MISSING[] = "cannot be read";
+
 static int digit(char c) {
     if (c >= '0' && c <= '9') return c - '0';
     c = (char)(c | 32);
@@ -101,7 +103,7 @@ const char *resources_read(Resources *r, const char *path) {
     double head[4];
     memset(r, 0, sizeof *r);
     r->memory = bytes_of(path, &n);
-    if (!r->memory) return "cannot be read";
+    if (!r->memory) return MISSING;
     char *at = r->memory, *end = r->memory + n;
     if (!lines_read(r, &at, end)) return "is no tirelib-core/1";
     if ((size_t)(end - at) < sizeof head || (size_t)(end - at) % sizeof(double))
@@ -118,6 +120,8 @@ const char *resources_read(Resources *r, const char *path) {
     memcpy(r->table, at, (size_t)(end - at));
     return NULL;
 }
+
+int resources_missing(const char *wrong) { return wrong == MISSING; }
 
 void resources_free(Resources *r) {
     free(r->memory);

@@ -24,6 +24,8 @@ void path_of(const char *uri, char *path);
 
 /* Read a file. Returns what is wrong with it, NULL if nothing is. */
 const char *resources_read(Resources *resources, const char *path);
+/* Whether what is wrong is that the file is not there. */
+int resources_missing(const char *wrong);
 void resources_free(Resources *resources);
 
 #endif

@@ -1,4 +1,5 @@
-/* An instance of StrainTire.fmu behind the functions of FMI, whichever version calls it.
+/* An instance of StrainTire.fmu or VirtualTire.fmu behind the functions of FMI, whichever version
+ * calls it.
  *
  * Variables, refusals and texts are those of the Python FMU: tirelib.fmu.slave, tirelib.fmu.wheel,
  * fmu_src/strain_tire.py. Tests: test_native_fmu, test_native_fmi3. Memory is taken at the
@@ -10,6 +11,7 @@
 #include <stdint.h>
 
 #include "../core/state.h"
+#include "../tire/rolling.h"
 #include "resources.h"
 
 enum { PARAMETERS = 6, P_RATE = 0, P_ORDER, P_MISSING, P_AXES, P_CALIBRATION, P_TIRE };
@@ -17,23 +19,47 @@ enum { TEXT = 4096, LINE = 8192, CAUSES = 50 };
 enum { INSTANTIATED, STEPPING, TERMINATED };
 enum { DONE = 0, FAILED = 3 }; /* statuses, alike in FMI 2 and 3 */
 
-/* How a version of FMI tells a text, and what it calls identifier, place of the resources, types. */
+/* How a version of FMI tells a text, and what it calls identifier, place of the resources, types.
+ */
 typedef struct {
     void (*tell)(const void *host, const char *name, const char *text);
     const char *guid, *place, *real, *integer;
 } Dialect;
 
+typedef struct Slave Slave;
+
+/* What differs between the FMUs. Each finds its data in a file of the resources. */
 typedef struct {
+    const char *file;
+    int truth, truths;       /* Booleans among the outputs behind the Reals */
+    int (*place)(Slave *s);  /* take the data, say where variables stand; 0: damaged */
+    void (*first)(Slave *s); /* start values that are neither NaN nor 0 */
+    int (*start)(Slave *s);  /* start with the parameters; 0, and told: it cannot */
+    int (*step)(Slave *s, double step);
+    void (*publish)(Slave *s); /* write the outputs */
+    void (*foresee)(Slave *s); /* write what a start would show */
+    size_t (*state_size)(const Slave *s);
+    void (*save)(const Slave *s, unsigned char *bytes);
+    int (*restore)(Slave *s, const unsigned char *bytes, size_t n);
+} Model;
+
+extern const Model STRAIN_MODEL, VIRTUAL_MODEL;
+
+struct Slave {
     const Dialect *dialect;
+    const Model *model;
     const void *host; /* whom `tell` tells */
     char *name, *folder;
     Resources own, other; /* `other`: the parameter `calibration` */
     Calibration *calibration;
     Wheel *wheel;
+    TireSurface surface;
+    RollingTire *tire;
+    int running;  /* whether wheel or tire was started */
     void *memory; /* of the wheel */
     size_t size;  /* of that memory */
     int gages, samples, buffered, phase, refused;
-    int announced; /* the turn that an event was last about */
+    int announced;                                   /* the turn that an event was last about */
     size_t frame, conditions, outputs, reals, count; /* places; how many variables */
     double *real;
     int *whole; /* Integers and Booleans */
@@ -41,7 +67,7 @@ typedef struct {
     char rolling[16], status[LINE], cause[LINE];
     uint64_t told[CAUSES];
     unsigned times[CAUSES], causes;
-} Slave;
+};
 
 /* A state: variables and parameters, then the wheel's. */
 typedef struct {
@@ -59,6 +85,13 @@ void slave_free(Slave *s);
 void slave_tell(const Slave *s, const char *text);
 void slave_complain(Slave *s, const char *cause);
 int slave_failed(Slave *s, const char *format, ...);
+
+/* Add a word to the status, by semicolons; one with the cause, without the semicolon. */
+void slave_add(Slave *s, const char *word);
+void slave_add_cause(Slave *s, const char *word);
+
+/* Let nothing be valid until a step is done; returns FAILED. */
+int slave_refuse(Slave *s, const char *format, ...);
 
 /* Bring all variables to their start values. */
 void slave_reset(Slave *s);

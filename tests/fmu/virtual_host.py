@@ -53,8 +53,9 @@ def friction_file() -> Path:
 
 
 @cache
-def file(samples: int) -> Path:
-    return build_virtual(live.folder() / f"VirtualTire_{samples}.fmu", samples_per_step=samples)
+def file(samples: int, *, python: bool = False) -> Path:
+    name = f"VirtualTire_{samples}{'_python' if python else ''}.fmu"
+    return build_virtual(live.folder() / name, samples_per_step=samples, python=python)
 
 
 def hold_against_rig(known: Surface, condition: Sequence[float], part: str) -> tuple[State, Forces]:
@@ -103,6 +104,7 @@ class Host:
         ]
         self.samples = len(self.strains) // 5
         self.folder = extract(str(path))
+        self.python = (Path(self.folder) / "resources" / "slavemodule.txt").is_file()
         self.slave: Any = FMU2Slave(
             guid=description.guid,
             unzipDirectory=self.folder,

@@ -12,7 +12,9 @@
 
 #include "../../fmu_src/core/state.h"
 #include "../../fmu_src/fmi2/fmi2.h"
+#include "../../fmu_src/fmi3/fmi3.h"
 #include "../../fmu_src/slave/resources.h"
+#include "../../fmu_src/tire/rolling.h"
 
 fmi2Component fmi2Instantiate(fmi2String, fmi2Type, fmi2String, fmi2String,
                               const fmi2CallbackFunctions *, fmi2Boolean, fmi2Boolean);
@@ -31,13 +33,33 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component, fmi2FMUstate, size_t *);
 fmi2Status fmi2SerializeFMUstate(fmi2Component, fmi2FMUstate, char[], size_t);
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component, const char[], size_t, fmi2FMUstate *);
 
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String, fmi3String, fmi3String, bool, bool, bool, bool,
+                                         const unsigned[], size_t, void *, fmi3LogMessageCallback,
+                                         fmi3IntermediateUpdateCallback);
+void fmi3FreeInstance(fmi3Instance);
+fmi3Status fmi3ExitInitializationMode(fmi3Instance), fmi3Reset(fmi3Instance);
+fmi3Status fmi3EnterEventMode(fmi3Instance), fmi3EnterStepMode(fmi3Instance);
+fmi3Status fmi3Terminate(fmi3Instance);
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance, bool *, bool *, bool *, bool *, bool *, double *);
+fmi3Status fmi3DoStep(fmi3Instance, double, double, bool, bool *, bool *, bool *, double *);
+fmi3Status fmi3GetFloat64(fmi3Instance, const unsigned[], size_t, double[], size_t);
+fmi3Status fmi3SetFloat64(fmi3Instance, const unsigned[], size_t, const double[], size_t);
+fmi3Status fmi3SetInt32(fmi3Instance, const unsigned[], size_t, const int32_t[], size_t);
+fmi3Status fmi3SetString(fmi3Instance, const unsigned[], size_t, const fmi3String[], size_t);
+fmi3Status fmi3GetClock(fmi3Instance, const unsigned[], size_t, bool[]);
+fmi3Status fmi3GetFMUState(fmi3Instance, fmi3FMUState *), fmi3SetFMUState(fmi3Instance, fmi3FMUState);
+fmi3Status fmi3FreeFMUState(fmi3Instance, fmi3FMUState *);
+fmi3Status fmi3DeserializeFMUState(fmi3Instance, const fmi3Byte[], size_t, fmi3FMUState *);
+
 enum { SAMPLES = 10, MOST_SAMPLES = 400 };
 
-static Resources own;
+static Resources own, tire;
 static char *file;
 static size_t file_size, samples;
 static double *strain;
 static char folder[4096];
+
+enum { BEHIND = 17 }; /* start values behind a surface */
 
 /* What is left of the bytes; zeros behind their end. */
 typedef struct {
@@ -158,6 +180,35 @@ static void try_wheel(Source *s) {
     free(known);
 }
 
+/* A response surface of which numbers are changed, wild options, conditions and steps. */
+static void try_tire(Source *s) {
+    size_t n = tire.numbers - BEHIND;
+    double *table = memory(n * sizeof *table), in[MOST_INPUTS], most;
+    RollingTire *w = memory(sizeof *w);
+    TireSurface surface;
+    memcpy(table, tire.table, n * sizeof *table);
+    for (int edits = (int)byte_of(s) % 4; edits > 0; edits--) {
+        size_t at = byte_of(s) < 160 ? place_of(s, 60) : place_of(s, n);
+        table[at] = number_of(s, table[at]);
+    }
+    TireOptions options = {5000.0, {0.3, 0.1}, 4e-6, -3.0, 0.0, 0.0, 0.0, 0.2, 0, 7};
+    if (byte_of(s) < 128) options.saturation = 1e-3, options.drift = 1e-3, options.dead_gage = 2;
+    if (tire_surface_read(&surface, table, n)) {
+        for (int i = 0; i < surface.inputs; i++) in[i] = 0.5 * (surface.low[i] + surface.high[i]);
+        rolling_start(w, &surface, &options, SAMPLES, in);
+        for (int steps = 0; steps < 40 && s->at < s->end; steps++) {
+            double length = byte_of(s) < 200 ? SAMPLES / 5000.0 : number_of(s, 0.001);
+            if (byte_of(s) < 128) {
+                int at = (int)byte_of(s) % surface.inputs;
+                in[at] = number_of(s, 0.5 * (surface.low[at] + surface.high[at]));
+            }
+            rolling_step(w, &surface, length, in, &most);
+        }
+    }
+    free(w);
+    free(table);
+}
+
 static void said(fmi2Environment e, fmi2String name, fmi2Status status, fmi2String category,
                  fmi2String text, ...) {
     (void)e, (void)name, (void)status, (void)category;
@@ -231,6 +282,48 @@ static void try_fmi(Source *s) {
     fmi2FreeInstance(c);
 }
 
+/* Calls of FMI 3 in any order: references into arrays, counts that do not fit, events, states. */
+static void try_fmi3(Source *s) {
+    double values[2 * SAMPLES * GAGES] = {0.0}, time;
+    fmi3FMUState state = NULL;
+    bool flag[5];
+    fmi3Instance c = fmi3InstantiateCoSimulation("w", own.guid, folder, false, false,
+                                                 byte_of(s) < 128, false, NULL, 0, NULL, NULL, NULL);
+    if (byte_of(s) < 220) fmi3ExitInitializationMode(c);
+    for (int calls = 0; c && calls < 60 && s->at < s->end; calls++) {
+        unsigned r[2] = {(unsigned)place_of(s, own.variables + 3), 6};
+        size_t n = byte_of(s) < 200 ? 1 : 2;
+        size_t m = byte_of(s) < 128 ? n : place_of(s, 2 * SAMPLES * GAGES);
+        fmi3String text = byte_of(s) < 128 ? "sae" : "%s%n";
+        int32_t whole = (int32_t)byte_of(s) - 20;
+        if (byte_of(s) < 100) r[0] = 6, m = SAMPLES * 5;
+        values[0] = number_of(s, 1e-3);
+        switch (byte_of(s) % 12) {
+        case 0: fmi3SetFloat64(c, r, n, values, m); break;
+        case 1: fmi3GetFloat64(c, r, n, values, m); break;
+        case 2: fmi3SetInt32(c, r, 1, &whole, 1); break;
+        case 3: fmi3SetString(c, r, 1, &text, m); break;
+        case 4: fmi3GetClock(c, r, 1, flag); break;
+        case 5: case 6:
+            fmi3DoStep(c, 0.0, byte_of(s) < 200 ? SAMPLES / 5000.0 : values[0], true, flag, flag + 1,
+                       flag + 2, &time);
+            break;
+        case 7: byte_of(s) < 60 ? fmi3Reset(c) : fmi3ExitInitializationMode(c); break;
+        case 8: byte_of(s) < 60 ? fmi3Terminate(c) : fmi3EnterStepMode(c); break;
+        case 9: fmi3EnterEventMode(c); break;
+        case 10:
+            fmi3UpdateDiscreteStates(c, flag, flag + 1, flag + 2, flag + 3, flag + 4, &time);
+            break;
+        case 11:
+            if (byte_of(s) < 100) fmi3GetFMUState(c, &state);
+            else if (byte_of(s) < 128) fmi3DeserializeFMUState(c, s->at, (size_t)(s->end - s->at), &state);
+            else fmi3SetFMUState(c, state);
+        }
+    }
+    fmi3FreeFMUState(c, &state);
+    fmi3FreeInstance(c);
+}
+
 static char *whole_file(const char *name, size_t *n) {
     char path[4200];
     snprintf(path, sizeof path, "%s/%s", folder, name);
@@ -256,10 +349,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         samples = n / sizeof(double) / 5;
         snprintf(path, sizeof path, "%s/StrainTire.core", folder);
         if (resources_read(&own, path) || !samples) exit(2);
+        snprintf(path, sizeof path, "%s/VirtualTire.core", folder);
+        if (resources_read(&tire, path) || tire.numbers <= BEHIND) exit(2);
     }
-    switch (byte_of(&s) % 4) {
+    switch (byte_of(&s) % 6) {
     case 0: try_table(&s); break;
     case 1: case 2: try_wheel(&s); break;
+    case 3: try_fmi3(&s); break;
+    case 4: try_tire(&s); break;
     default: try_fmi(&s);
     }
     return 0;

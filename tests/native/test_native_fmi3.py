@@ -269,6 +269,10 @@ def test_the_clock_ticks_once_where_a_turn_has_ended(fmus: dict[int, Path]) -> N
             ticks += 1
         turns = now
     assert ticks == turns >= 3
+    late = Host3(fmus[3], events=True)  # an event that was handled is none in another instance
+    state = host.slave.serializeFMUState(host.slave.getFMUState())
+    late.slave.setFMUState(late.slave.deserializeFMUState(state))
+    assert late.step(*frames()[-1], now=len(frames()) * STEP)[0] is False
 
 
 def test_without_event_mode_there_are_no_events(fmus: dict[int, Path]) -> None:

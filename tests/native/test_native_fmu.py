@@ -275,7 +275,12 @@ def test_the_compiler_makes_the_same_binary_again(place: str) -> None:
 
 def test_a_process_without_python_needs_nothing(folder: Path, tmp_path: Path) -> None:
     """The library needs the C library alone; a C program loads, steps and leaves it."""
-    library = folder / "binaries" / "linux64" / "StrainTire.so"
+    c_host(folder, "StrainTire", tmp_path, 0.004)
+
+
+def c_host(folder: Path, model: str, tmp_path: Path, step: float) -> None:
+    """Load an unpacked FMU in a C program, take two steps, and leave."""
+    library = folder / "binaries" / "linux64" / f"{model}.so"
     if sys.platform != "linux":
         pytest.skip("the host is for Linux")
     source = tmp_path / "host.c"
@@ -283,20 +288,20 @@ def test_a_process_without_python_needs_nothing(folder: Path, tmp_path: Path) ->
     subprocess.run(["gcc", "-O1", str(source), "-ldl", "-o", str(tmp_path / "host")], check=True)
     guid = read_model_description(str(folder), validate=False).guid
     place = (folder / "resources").as_uri()
-    done = subprocess.run(
-        [tmp_path / "host", library, guid, place], capture_output=True, text=True, check=False
-    )
+    command = [tmp_path / "host", library, guid, place, repr(step)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "0 0 0\n", "")
 
 
 _HOST = """
 #include <dlfcn.h>
 #include <stdio.h>
+#include <stdlib.h>
 typedef struct { void *log, *take, *give, *done, *environment; } Callbacks;
 int main(int n, char **argument) {
     Callbacks none = {0};
     void *library = dlopen(argument[1], RTLD_NOW);
-    if (n < 4 || !library) return fprintf(stderr, "%s", dlerror()), 1;
+    if (n < 5 || !library) return fprintf(stderr, "%s", dlerror()), 1;
     void *(*make)(const char *, int, const char *, const char *, void *, int, int);
     int (*start)(void *), (*step)(void *, double, double, int);
     void (*leave)(void *);
@@ -307,8 +312,9 @@ int main(int n, char **argument) {
     void *wheel = make("w", 1, argument[2], argument[3], &none, 0, 0);
     if (!wheel) return 2;
     printf("%d ", start(wheel));
-    printf("%d ", step(wheel, 0.0, 0.004, 0));
-    printf("%d\\n", step(wheel, 0.004, 0.004, 0));
+    double length = atof(argument[4]);
+    printf("%d ", step(wheel, 0.0, length, 0));
+    printf("%d\\n", step(wheel, length, length, 0));
     leave(wheel);
     return dlclose(library);
 }

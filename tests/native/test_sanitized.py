@@ -10,7 +10,7 @@ import native_fmu
 import numpy as np
 import pytest
 
-from tests.fmu import live
+from tests.fmu import live, virtual_host
 from tests.native.core import SOURCE
 
 HERE = Path(__file__).parent
@@ -29,7 +29,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if compiler is None:
         pytest.skip("no C compiler on this machine")
     out = tmp_path_factory.mktemp("fuzz") / "fuzz"
-    rooms = [SOURCE, *(SOURCE.parent / room for room in ("slave", "fmi2", "fmi3"))]
+    rooms = [SOURCE, *(SOURCE.parent / room for room in ("tire", "slave", "fmi2", "fmi3"))]
     sources = [source for room in rooms for source in room.glob("*.c")]
     flags = (*native_fmu.C99, *native_fmu.STRICT, *SANITIZERS, "-DALONE")
     command = [compiler, *flags, HERE / "fuzz.c", *sorted(sources), "-lm", "-o", out]
@@ -45,6 +45,9 @@ def fed(program: Path) -> Path:
     with zipfile.ZipFile(live.fmu_file(10)) as archive:
         core = archive.read("resources/StrainTire.core")
     (folder / "StrainTire.core").write_bytes(core)
+    with zipfile.ZipFile(virtual_host.file(10)) as archive:
+        archive.extract("resources/VirtualTire.core", folder)
+    (folder / "resources" / "VirtualTire.core").rename(folder / "VirtualTire.core")
     strain = live.strain_of(4e3, 0.1, turns=6.4)[0]
     np.ascontiguousarray(strain.T).tofile(folder / "samples.bin")
     return folder

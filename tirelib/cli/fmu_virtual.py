@@ -14,11 +14,13 @@ _EPILOG = """\b
 Examples:
   tirelib fmu virtual --out VirtualTire.fmu --samples-per-step 10
   tirelib fmu virtual --out Wet.fmu --friction     # friction is an input
+  tirelib fmu virtual --out Slow.fmu --python       # computes in Python
   tirelib fmu check VirtualTire.fmu
 
 \b
 FMI 2.0 co-simulation, one wheel: Fz, alpha, kappa, camber, speed and pressure in, strain frames out
-for StrainTire.fmu with the same samples per step. Needs CPython with numpy and scipy where it runs.
+for StrainTire.fmu with the same samples per step. It is compiled for Linux, Windows and macOS and
+needs nothing else where it runs (with --python: CPython with numpy and scipy).
 """
 
 
@@ -51,9 +53,19 @@ for StrainTire.fmu with the same samples per step. Needs CPython with numpy and 
     is_flag=True,
     help="Use the reference tire's response surface with friction as an input.",
 )
+@click.option(
+    "--python",
+    is_flag=True,
+    help="Pack the Python tire instead of the compiled one.",
+)
 @progress_options
 def virtual(
-    out: Path, samples_per_step: int, sample_rate: float, surface: Path | None, friction: bool
+    out: Path,
+    samples_per_step: int,
+    sample_rate: float,
+    surface: Path | None,
+    friction: bool,
+    python: bool,
 ) -> None:
     """Write VirtualTire.fmu: the numerical rig as a sensor."""
     if friction and surface is not None:
@@ -68,6 +80,7 @@ def virtual(
             samples_per_step=samples_per_step,
             sample_rate=sample_rate,
             surface=surface or usual,
+            python=python,
             progress=progress,
         )
     console = output()

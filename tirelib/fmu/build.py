@@ -11,6 +11,7 @@ from pathlib import Path
 from tirelib.errors import FormatError, ParameterError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
+from tirelib.estimators.core_table import flat_table
 from tirelib.fmu.export import export
 from tirelib.fmu.native import pack
 from tirelib.fmu.parts import DEFAULT_RATE, check_writable
@@ -88,7 +89,9 @@ def build_fmu(
         sealed=sealed,
         fmi=fmi,
     )
-    return export(spec, out, progress) if python else pack(spec, loaded, out, progress)
+    if python:
+        return export(spec, out, progress)
+    return pack(spec, loaded.tire, flat_table(loaded), out, progress)
 
 
 def embedded_calibration(fmu: str | Path) -> Calibration:

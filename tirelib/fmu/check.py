@@ -32,7 +32,7 @@ LARGEST_UNPACKED = 2_000_000_000
 MOST_FILES = 20_000
 TIME_LIMIT = 600.0
 """Seconds for one FMU."""
-OWN = {"resources/slavemodule.txt", "resources/StrainTire.core"}
+OWN = {f"resources/{n}" for n in ("slavemodule.txt", "StrainTire.core", "VirtualTire.core")}
 """What FMUs of this library hold beside ``resources/settings.json``: one of these."""
 _PARTS = ("archive", "validation", "run", "reference")
 

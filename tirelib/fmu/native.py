@@ -1,7 +1,8 @@
-"""Pack ``StrainTire.fmu`` without Python: prebuilt binaries, and the calibration as numbers.
+"""Pack an FMU without Python: prebuilt binaries, and calibration or response surface as numbers.
 
 The binaries of ``fmu_src/binaries`` are the same for every FMU (``build/native_fmu.py`` makes
-them); what differs stands in ``resources/StrainTire.core``, whose format `core_file` writes.
+them); what differs stands in ``resources/StrainTire.core`` or ``VirtualTire.core``, whose format
+`resource_file` writes.
 """
 
 import json
@@ -13,6 +14,7 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from tirelib import __version__
+from tirelib.arrays import FloatArray
 from tirelib.errors import FormatError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.core_table import flat_table
@@ -43,16 +45,27 @@ PLATFORMS: Mapping[int, Mapping[str, Sequence[str]]] = {
 
 def pack(
     spec: SlaveSpec,
-    calibration: Calibration,
+    title: str,
+    data: FloatArray,
     out: str | Path,
     progress: Callable[[str], None] | None = None,
 ) -> Path:
     """Write the FMU of `spec` around the core.
 
+    Parameters
+    ----------
+    spec : SlaveSpec
+    title : str
+        Name of the tire.
+    data : array, shape (n,)
+        What the core reads: `flat_table` of a calibration or of a response surface, and so on.
+    out : path
+    progress : callable, optional
+
     Raises
     ------
     FormatError
-        If the core does not know a regressor of the calibration, or the FMU cannot be written.
+        If the FMU cannot be written.
     """
     tell = progress or (lambda _: None)
     target = Path(out)
@@ -60,28 +73,31 @@ def pack(
     tell("described")
     sources = core_sources(spec.fmi)
     computing = {
-        f"binaries/{folder}/{name.split('/')[1]}": source_file(f"binaries/{name}").read_bytes()
+        f"binaries/{folder}/{spec.model}{Path(name).suffix}": binary
         for name, folders in PLATFORMS[spec.fmi].items()
+        for binary in (source_file(f"binaries/{name}").read_bytes(),)
         for folder in folders
     }
     computing |= {f"sources/{name}": source_file(name).read_bytes() for name in sources}
     if spec.fmi == 3:
         computing["sources/buildDescription.xml"] = build_description(spec.model, sources)
-    identity = identity_of(spec, computing)
-    core = core_file(
-        calibration,
+    identity = identity_of(spec, {**computing, "data": data.tobytes()})
+    usual = {"buffered": 0.0, "missing": math.nan}
+    core = resource_file(
+        title,
+        data,
         guid=identity.guid,
         table=flat_names(spec.table) if spec.fmi == 3 else spec.table,
         numbers=[
-            float(spec.settings[name])
+            float(spec.settings.get(name, usual.get(name, math.nan)))
             for name in ("samples_per_step", "buffered", "sample_rate", "missing")
         ],
     )
     files = {
         **computing,
-        **{f"resources/{name}": data for name, data in spec.resources.items()},
+        **{f"resources/{name}": part for name, part in spec.resources.items()},
         "resources/settings.json": json.dumps(dict(spec.settings), indent=1).encode(),
-        "resources/StrainTire.core": core,
+        f"resources/{spec.model}.core": core,
         "modelDescription.xml": _description_of_3(spec, identity)
         if spec.fmi == 3
         else _description(spec, identity, sources),
@@ -95,13 +111,25 @@ def pack(
 def core_sources(fmi: int) -> list[str]:
     """Return the C files of the FMU, relative to ``fmu_src``, in the order of their names."""
     folder = source_file("core/wheel.c").parents[1]
-    rooms = ("core", "slave", f"fmi{fmi}")
+    rooms = ("core", "tire", "slave", f"fmi{fmi}")
     found = (path for room in rooms for path in (folder / room).glob("*.[ch]"))
     return sorted(path.relative_to(folder).as_posix() for path in found)
 
 
-def core_file(
-    calibration: Calibration,
+def core_file(calibration: Calibration) -> bytes:
+    """Return the file that the parameter `calibration` of an FMU takes.
+
+    Raises
+    ------
+    FormatError
+        If the tire's name has more than one line, or the core does not know a regressor.
+    """
+    return resource_file(calibration.tire, flat_table(calibration))
+
+
+def resource_file(
+    title: str,
+    data: FloatArray,
     *,
     guid: str = "-",
     table: Sequence[Variable] = (),
@@ -111,7 +139,9 @@ def core_file(
 
     Parameters
     ----------
-    calibration : Calibration
+    title : str
+        Name of the tire.
+    data : array, shape (n,)
     guid : str
         Identifier of the FMU, as in the model description, in braces.
     table : sequence of Variable
@@ -123,15 +153,13 @@ def core_file(
     Raises
     ------
     FormatError
-        If the tire's name has more than one line, or the core does not know a regressor.
+        If the name has more than one line.
     """
-    if "\n" in calibration.tire:
-        raise FormatError(
-            f"calibration: tire = {calibration.tire!r}; a name of one line is needed; mend it"
-        )
-    lines = [FORMAT, guid, calibration.tire, str(len(table))]
+    if "\n" in title:
+        raise FormatError(f"tire = {title!r}; a name of one line is needed; mend it")
+    lines = [FORMAT, guid, title, str(len(table))]
     lines += [f"{v.kind[0]}{v.causality[0]}{v.name}" for v in table]
-    values = np.concatenate((np.array(numbers, dtype=np.float64), flat_table(calibration)))
+    values = np.concatenate((np.array(numbers, dtype=np.float64), data))
     return "\n".join((*lines, "")).encode() + values.astype("<f8").tobytes()
 
 

@@ -11,10 +11,12 @@ from tirelib.arrays import FloatArray
 from tirelib.errors import ParameterError
 from tirelib.fmu.export import export
 from tirelib.fmu.handbook import html_table, page
+from tirelib.fmu.native import pack
 from tirelib.fmu.parts import DEFAULT_RATE, source_file
 from tirelib.fmu.reference import FOLDER, Reference
 from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.virtual.coordinates import FRICTION
+from tirelib.fmu.virtual.core_table import flat_table
 from tirelib.fmu.virtual.options import RATES, Options
 from tirelib.fmu.virtual.surface import Surface, read_surface
 from tirelib.fmu.virtual.table import START, inputs, outputs, parameters
@@ -34,6 +36,7 @@ def build_virtual(
     samples_per_step: int = 10,
     sample_rate: float = DEFAULT_RATE,
     surface: str | Path | None = None,
+    python: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Path:
     """Write ``VirtualTire.fmu``: an FMI 2.0 co-simulation unit, the mirror of ``StrainTire.fmu``.
@@ -48,6 +51,8 @@ def build_virtual(
         Start value of the parameter of that name.
     surface : path, optional
         By default the numerical rig's reference tire; `friction_surface` has friction as an input.
+    python : bool
+        Whether Python computes in the FMU, where it runs, instead of the compiled core.
     progress : callable, optional
         Called with what was done.
 
@@ -58,8 +63,14 @@ def build_virtual(
     FormatError
         If the surface cannot be read, or the FMU cannot be written.
     """
-    spec = virtual_tire(surface or default_surface(), samples_per_step, sample_rate)
-    return export(spec, out, progress)
+    path = Path(surface or default_surface())
+    spec = virtual_tire(path, samples_per_step, sample_rate, python=python)
+    if python:
+        return export(spec, out, progress)
+    known = read_surface(path)
+    starts = [float(v.start) for v in spec.table if v.causality != "output"]
+    title = str(known.about.get("tire", "")) or MODEL
+    return pack(spec, title, np.concatenate((flat_table(known), starts)), out, progress)
 
 
 def default_surface() -> Path:
@@ -72,8 +83,10 @@ def friction_surface() -> Path:
     return models_folder() / "virtual_tire" / "friction.npz"
 
 
-def virtual_tire(surface: str | Path, samples_per_step: int, sample_rate: float) -> SlaveSpec:
-    """Return what `tirelib.fmu.export.export` needs; see `build_virtual`."""
+def virtual_tire(
+    surface: str | Path, samples_per_step: int, sample_rate: float, *, python: bool = False
+) -> SlaveSpec:
+    """Return what the FMU consists of; see `build_virtual`."""
     if not 1 <= samples_per_step <= MOST_SAMPLES:
         raise ParameterError(
             f"samples per step = {samples_per_step}; allowed are 1 .. {MOST_SAMPLES}; take a "
@@ -96,10 +109,12 @@ def virtual_tire(surface: str | Path, samples_per_step: int, sample_rate: float)
         step_size=samples_per_step / sample_rate,
         settings={"samples_per_step": samples_per_step, "sample_rate": sample_rate},
         resources={
-            "surface.npz": Path(surface).read_bytes(),
+            **({"surface.npz": Path(surface).read_bytes()} if python else {}),
             **{f"{FOLDER}/{name}": data for name, data in reference.files(MODEL).items()},
         },
-        documentation={"index.html": _page(known, table, samples_per_step, sample_rate).encode()},
+        documentation={
+            "index.html": _page(known, table, samples_per_step, sample_rate, python).encode()
+        },
         icon=source_file("strain_tire.png").read_bytes(),
     )
 
@@ -135,7 +150,7 @@ def _row(wheel: VirtualWheel) -> list[float]:
     return [*values, *(float(value) for value in others if not isinstance(value, str))]
 
 
-def _page(surface: Surface, table: list[Any], samples: int, rate: float) -> str:
+def _page(surface: Surface, table: list[Any], samples: int, rate: float, python: bool) -> str:
     lead = (
         "A virtual tire: the signals that five gages on its innerliner would show, sample by "
         "sample, at the load, slip, camber, speed and pressure that a vehicle model gives."
@@ -146,9 +161,11 @@ def _page(surface: Surface, table: list[Any], samples: int, rate: float) -> str:
         "samples per step": f"up to {samples} (the output samples gives the number of new ones)",
         "sample rate": f"{rate:g} Hz (parameter sample_rate)",
         "communication step": f"up to {1e3 * samples / rate:g} ms",
-        "needs": "CPython 3.11 or newer with numpy and scipy; linux64 or win64",
+        "needs": "CPython 3.11 or newer with numpy and scipy; linux64 or win64"
+        if python
+        else "nothing else; Linux (x86-64, AArch64), Windows (x86-64), macOS 11",
         "version": "{version}",
-        "licences": "documentation/licenses: MIT, tirelib and pythonfmu",
+        "licences": f"documentation/licenses: MIT, tirelib{' and pythonfmu' if python else ''}",
     }
     drawing = source_file("conventions.svg").read_text(encoding="utf-8")
     sections = {

@@ -91,7 +91,8 @@ class Surface:
         return INPUTS if self.low.size == len(INPUTS) else (*INPUTS, FRICTION)
 
     @cached_property
-    def _interpolator(self) -> RBFInterpolator:
+    def interpolator(self) -> RBFInterpolator:
+        """What `answers` asks; also the data of the compiled virtual tire."""
         n = len(self.points)
         mirror = self.edges[:, :, ::-1]
         values = np.concatenate(
@@ -114,7 +115,8 @@ class Surface:
         return self.slip.tolist(), self.scales.tolist()
 
     @cached_property
-    def _waveforms(self) -> Waveforms:
+    def waveforms(self) -> Waveforms:
+        """Mean and components as splines."""
         return Waveforms(self.mean, self.basis)
 
     @cached_property
@@ -124,7 +126,7 @@ class Surface:
     @one_thread()
     def warm(self) -> "Surface":
         """Compute now what the first use would compute."""
-        _ = self._interpolator, self._waveforms
+        _ = self.interpolator, self.waveforms
         return self
 
     def outside(self, inputs: Sequence[float] | FloatArray) -> tuple[str, ...]:
@@ -144,12 +146,12 @@ class Surface:
         """
         found: FloatArray
         if len(inputs) == 1:  # one row is too little for two threads
-            found = self._interpolator(
+            found = self.interpolator(
                 np.array([coordinates(inputs[0].tolist(), *self._shape, math)])
             )
             return found
         with one_thread():
-            found = self._interpolator(self._places(inputs))
+            found = self.interpolator(self._places(inputs))
         return found
 
     def forces_of(self, answers: FloatArray) -> FloatArray:
@@ -164,7 +166,7 @@ class Surface:
         answers : array, shape (1, ...)
             Result of `answers`.
         """
-        return self._waveforms.mixed(answers[0, : len(self.basis)])
+        return self.waveforms.mixed(answers[0, : len(self.basis)])
 
     def strain(
         self,
@@ -187,10 +189,10 @@ class Surface:
         if waveform is None and len(angle) == 1:
             row = answers[0]
             edges = row[k : k + 2 * g].tolist()
-            seen = self._waveforms.one(row[:k], edges[:g], edges[g:], float(angle[0]))
+            seen = self.waveforms.one(row[:k], edges[:g], edges[g:], float(angle[0]))
             return np.array([seen])
         parts = answers[:, :k], answers[:, k : k + g], answers[:, k + g : k + 2 * g]
-        return self._waveforms.many(*parts, np.asarray(angle), waveform)
+        return self.waveforms.many(*parts, np.asarray(angle), waveform)
 
     @cached_property
     def _rolling(self) -> list[tuple[float, int, int, int]]:

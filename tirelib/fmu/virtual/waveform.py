@@ -25,7 +25,7 @@ class Waveforms:
         self._scale = self._grid / (2.0 * math.pi)
         both = np.concatenate((basis, mean[None]))
         found = spline_filter1d(np.moveaxis(both, 0, 2), axis=0, mode="grid-wrap")
-        self._spline: FloatArray = np.ascontiguousarray(found)
+        self.spline: FloatArray = np.ascontiguousarray(found)
         """Coefficients of cubic B-splines, the mean last, shape (m, g, k + 1)."""
         self._every = np.arange(self._gages)
         self._own = np.ones(self._count + 1)
@@ -34,14 +34,14 @@ class Waveforms:
     @cached_property
     def _windows(self) -> FloatArray:
         """Four neighbours from every place on, shape (g, m, 4, k + 1); a view of the spline."""
-        wrapped = np.concatenate((self._spline[-1:], self._spline, self._spline[:2]))
+        wrapped = np.concatenate((self.spline[-1:], self.spline, self.spline[:2]))
         own = np.ascontiguousarray(np.swapaxes(wrapped, 0, 1))
         four = np.lib.stride_tricks.sliding_window_view(own, 4, axis=1)
         return np.swapaxes(four, 2, 3)
 
     def mixed(self, scores: FloatArray) -> FloatArray:
         """Return spline coefficients of one condition, shape (m, g), for `many` at many angles."""
-        return np.asarray(self._spline[:, :, :-1] @ scores + self._spline[:, :, -1])
+        return np.asarray(self.spline[:, :, :-1] @ scores + self.spline[:, :, -1])
 
     def many(
         self,
@@ -71,7 +71,7 @@ class Waveforms:
             return np.asarray((mixed[rows, gage] * weights).sum(axis=2))
         own = np.ones((len(scores), 1, self._count + 1))
         own[:, 0, :-1] = scores
-        values = np.matmul(weights[..., None, :], self._spline[rows, gage])[..., 0, :]
+        values = np.matmul(weights[..., None, :], self.spline[rows, gage])[..., 0, :]
         return np.asarray((values * own).sum(axis=2))
 
     def one(

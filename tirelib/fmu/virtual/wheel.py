@@ -97,15 +97,15 @@ class VirtualWheel:
         exact = step * rate
         if not (math.isfinite(exact) and exact > 0.0):
             raise StepError(
-                f"communication step = {step} s; allowed is above 0; step by "
+                f"communication step = {step:g} s; allowed is above 0; step by "
                 f"{self.samples / rate:g} s"
             )
         until = self._due + exact
         count = math.floor(until + _ROUNDING)
         if count > self.samples:
             raise StepError(
-                f"communication step = {step} s brings {count} samples at {rate:g} Hz; allowed are "
-                f"up to {self.samples}, the frame's length; step by {self.samples / rate:g} s"
+                f"communication step = {step:g} s brings {count} samples at {rate:g} Hz; allowed "
+                f"are up to {self.samples}, the frame's length; step by {self.samples / rate:g} s"
             )
         due, self._due, self._new = self._due, until - count, count
         given, reached = list(inputs), self._count + count
