@@ -29,7 +29,6 @@ NO_FIT = 0.5
 SIGNIFICANT = 0.01
 BEYOND = 2.0
 """Rms of the predicted set points, in tolerances, from which they are misfit and not chance."""
-VERDICTS = ("fits", "lack_of_fit", "does_not_fit", "noise_unknown")
 
 
 @dataclass(frozen=True, slots=True)

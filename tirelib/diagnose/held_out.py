@@ -13,9 +13,8 @@ from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import LEAST_RUNS
 from tirelib.identify.error_bands import levels
 from tirelib.identify.waveform_fit import Data
-from tirelib.units import from_si
+from tirelib.quantities import QUANTITIES
 
-_TOLD = {"load": ("N", "force"), "pressure": ("bar", "pressure")}
 LEAST_LOADS, LEAST_PRESSURES = 3, 2
 
 
@@ -88,11 +87,11 @@ def held_out(
 
 def fold_entry(fold: Fold, before: float, after: float) -> dict[str, Any]:
     """Return a left-out part with its errors as documents tell them."""
-    unit, dimension = _TOLD[fold.name]
+    known = QUANTITIES[fold.name]
     return {
         "condition": fold.name,
-        "value": float(from_si(fold.value, unit, dimension)),
-        "unit": unit,
+        "value": float(known.told(fold.value)),
+        "unit": known.unit,
         "runs": int(fold.out.sum()),
         "error_before": before,
         "error_after": after,

@@ -7,16 +7,9 @@ from tirelib.compare.forces import UNITS
 from tirelib.diagnose.forces.assess import ForceAssessment
 from tirelib.diagnose.forces.held_out import ForceFold, pooled
 from tirelib.diagnose.told import candidate_told, verdict_told
-from tirelib.units import from_si
+from tirelib.quantities import QUANTITIES
 
 FORMAT = "tirelib-diagnosis/1"
-CONDITION_UNITS = {
-    "load": ("N", "force"),
-    "pressure": ("bar", "pressure"),
-    "camber": ("deg", "angle"),
-    "temperature": ("degC", "temperature"),
-    "speed": ("km/h", "speed"),
-}
 
 
 def force_diagnosis_document(told: ForceAssessment) -> dict[str, Any]:
@@ -86,10 +79,10 @@ def fold_entry(fold: ForceFold, before: float, after: float) -> dict[str, Any]:
 
 def fold_value(fold: ForceFold) -> tuple[float, str]:
     """Return what a left-out part has in common, with its unit; parts of time by their number."""
-    if fold.name not in CONDITION_UNITS:
+    if fold.name in ("time", "cell"):
         return fold.value + 1.0, "1"
-    unit, dimension = CONDITION_UNITS[fold.name]
-    return float(from_si(fold.value, unit, dimension)), unit
+    known = QUANTITIES[fold.name]
+    return float(known.told(fold.value)), known.unit
 
 
 def _unexplained(told: ForceAssessment) -> dict[str, Any]:
