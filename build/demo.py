@@ -36,6 +36,7 @@ from demo_live import (
     wait_for_port,
     write_device,
 )
+from pages.gallery import into_gallery
 
 from tirelib.threads import one_thread
 
@@ -307,6 +308,7 @@ def main() -> None:
         metavar="DIR",
         help=f"use ready campaigns in folders named {', '.join(PLANS)} instead of the rig",
     )
+    parser.add_argument("--gallery", action="store_true", help="renew docs/theory/gallery")
     parser.add_argument("--no-live", action="store_true", help="leave out FMU and serial line")
     parser.add_argument(
         "--measure",
@@ -395,6 +397,8 @@ def main() -> None:
             ]
         )
     page = draw(console, out, data, calibration, live, steps, reports)
+    if given.gallery:
+        into_gallery(out / "figures")
     console.print(Rule(f"done in {time.monotonic() - started:.0f} s", style="green"))
     for title, file in [("everything", page), *((t, out / f) for t, f in reports)]:
         console.print(f"open  {_short(Path(file))}   ({title})", highlight=False, soft_wrap=True)

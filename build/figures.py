@@ -10,7 +10,7 @@ import argparse
 from functools import cache
 from pathlib import Path
 
-from PIL import Image
+from pages.gallery import into_gallery
 from rich.console import Console
 from ring_figures import cases, contact, lateral, speed, static
 from ring_figures import loads as over_load
@@ -248,9 +248,7 @@ def main() -> None:
         sections=sections,
     )
     if given.gallery:
-        for png in (folder / "figures").glob("*.png"):
-            small = Image.open(png).convert("RGB").quantize(64)
-            small.save(ROOT / "docs/theory/gallery" / png.name, optimize=True)
+        into_gallery(folder / "figures")
     for picture in missing:
         console.print(f"not drawn: {picture.title}: {picture.reason}", highlight=False)
     console.print(f"open {page}", highlight=False, soft_wrap=True)
