@@ -6,9 +6,11 @@ are made from the code by ``docs/tables.py``.
 """
 
 import sys
+import zipfile
 from pathlib import Path
 
 HERE = Path(__file__).parent
+RIG = HERE / "tutorials" / "example_rig.py"
 sys.path[:0] = [str(HERE), str(HERE / "tutorials")]
 
 import equations
@@ -17,6 +19,7 @@ import tables
 
 project = "tirelib"
 author = "The tirelib developers"
+copyright = "The tirelib developers, MIT licence"
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
@@ -52,6 +55,7 @@ def setup(app):
     app.connect("config-inited", without_figures)
     app.connect("sphinx-click-process-epilog", as_printed)
     app.connect("builder-inited", lambda _: write_generated(HERE / "_generated"))
+    app.connect("builder-inited", lambda _: complete(HERE / "_tutorials"), priority=900)
 
 
 def write_generated(folder):
@@ -59,6 +63,14 @@ def write_generated(folder):
     tables.write_all(folder)
     for name in equations.plots():
         plots.draw(name, folder / "plots")
+
+
+def complete(folder):
+    """Put the laboratory that tutorials import into every archive to be downloaded."""
+    for file in folder.glob("*.zip"):
+        with zipfile.ZipFile(file, "a") as archive:
+            if RIG.name not in archive.namelist():
+                archive.write(RIG, RIG.name)
 
 
 def without_figures(app, config):

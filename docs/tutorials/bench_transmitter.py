@@ -7,8 +7,8 @@ shows and records. This page runs it twice without hardware: with the emulated t
 library, and with a transmitter of another make, which this script plays and a small *map*
 describes.
 
-You need ``pip install 'tirelib[bench]'``, Linux or macOS, and :doc:`example_rig.py
-<strain_to_load>` in the folder of this script.
+You need tirelib with the extra ``bench`` (:doc:`/howto/install`), Linux or macOS, and
+:download:`example_rig.py <../tutorials/example_rig.py>` in the folder of this script.
 """
 
 # %%
@@ -65,6 +65,8 @@ def valid_turns(file):
 #        --record live.mcap --json live.json --silence 5
 #
 # The second one shows a page in the browser (``--tui``: in the terminal); here it is switched off.
+# ``tirebench --help`` has all commands from an empty folder on, with a campaign of the numerical
+# rig in the place of ``laps``.
 
 measure(folder / "laps", [(load, 0.0, 0.0) for load in (2500, 5000, 3500)], seed=4, turns=4)
 sender = tirebench(

@@ -4,6 +4,9 @@ Write an effect, an estimator, a link
 
 Three places where people extend the library: a physical effect that a diagnosis should know, an
 estimator of their own next to the library's, and a link to a line that the bench does not know yet.
+
+You need tirelib with the extra ``bench`` (:doc:`/howto/install`), and :download:`example_rig.py
+<../tutorials/example_rig.py>` in the folder of this script.
 """
 
 # %%

@@ -6,7 +6,8 @@ Your rig writes CSV or MAT files, with its own names, units and axis system. ``t
 makes a campaign of them with a small *map*. This page does it for a table of forces and for MAT
 files with strain, and shows the mistakes that people make, with what the library says to each.
 
-It needs :doc:`example_rig.py <strain_to_load>` in the same folder, which plays your laboratory.
+You need tirelib (:doc:`/howto/install`), and :download:`example_rig.py
+<../tutorials/example_rig.py>` in the folder of this script; it plays your laboratory.
 """
 
 # %%

@@ -7,8 +7,9 @@ get a **calibration**; with it, every turn of any other measurement becomes a ve
 angle, a slip ratio and a lateral force, each with an interval. This page does it once from end to
 end.
 
-You need ``pip install tirelib``, this script, and :download:`example_rig.py
-<../tutorials/example_rig.py>` in the same folder. The script takes some seconds.
+You need tirelib (:doc:`/howto/install`), this script, and :download:`example_rig.py
+<../tutorials/example_rig.py>` in the same folder; the archives below hold both. The script takes
+some seconds.
 """
 
 # %%

@@ -7,9 +7,8 @@ that follows the *estimated* load: the virtual tire makes strain out of the true
 estimator makes a load out of the strain, and the brake uses it. Both are FMUs (FMI 2.0
 co-simulation), so any simulation tool can run the same loop.
 
-You need ``pip install 'tirelib[fmu]'`` and :doc:`example_rig.py <strain_to_load>` in the folder of
-this
-script.
+You need tirelib with the extra ``fmu`` (:doc:`/howto/install`), and :download:`example_rig.py
+<../tutorials/example_rig.py>` in the folder of this script.
 """
 
 # %%
