@@ -178,13 +178,13 @@ def _tested(
 
     `best` is the likeliest size of a run's own misfit.
     """
-    near = views[max(best - 1, 0) : best + 2]
-    nulls = tuple(_null(near, fit, family, law) for family in families)
+    at = [views[best]]
+    nulls = tuple(_null(at, fit, family, law) for family in families)
     plain = []
     for family in families:
         tires = plain_tires(problem, fit, family, law_errors(fit, law), OWN[best])
         others = [null for null in nulls if null.family is not family]
-        plain.append(_statistic(others, products(problem, near, tires)))
+        plain.append(_statistic(others, products(problem, at, tires)))
     return nulls, tuple(plain)
 
 

@@ -13,8 +13,9 @@ these standard scores is what stands out. The model of plain tires is not exact:
 get on plain tires is measured (`tirelib.infer.hypothesis`).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
@@ -31,14 +32,38 @@ SIZES = 2.0 ** np.arange(-2, 2)
 """Sizes of what one tire shows over what its family shows, among which its likelihood chooses. A
 tire that leaves little shows a weak effect; one that leaves far more than its family has something
 unknown, so that twice as much is the most that is excused."""
+APART = (0.5, 1.0, 2.0)
+"""Size of what one tire shows away from the contact over that in it: where it leaves little in
+the contact, and as much as others on the free belt, the free belt does not stand out."""
 SIZE_STD = 1.5
 """Standard deviation of the logarithm of this size."""
 OWN = tuple(0.0005 * 2.0 ** np.arange(6))
 """Sizes of the misfit that each run has for itself, over its rms strain, among which its likelihood
 chooses."""
 
+FREE = ", free belt"
+"""End of the name of shapes that stand away from the contact."""
+
 Products = Sequence[tuple[FloatArray, FloatArray]]
 """B r, (m, k), and r' r, (k,), of k residuals r for every view."""
+
+
+class Size(NamedTuple):
+    """How much one tire shows over what its family shows, in general and away from the contact."""
+
+    whole: float
+    free: float
+
+    def of(self, block: str) -> float:
+        """Return the size of a block: of an effect it is at most `LARGEST`."""
+        if "," not in block:
+            return min(self.whole, LARGEST)
+        return self.free if block.endswith(FREE) else self.whole
+
+    @property
+    def log_prior(self) -> float:
+        """Log density, up to a constant."""
+        return float(-0.125 * (np.log(self.whole * self.free) / SIZE_STD) ** 2)
 
 
 class Null:
@@ -74,11 +99,8 @@ class Null:
         typical = family.spread()
         self._weighed = []
         for view in views:
-            for size in _sizes(family.largest):
-                variance = {
-                    name: (size if "," in name else min(size, LARGEST)) ** 2 * each
-                    for name, each in typical.items()
-                }
+            for size in _sizes(family.largest, typical):
+                variance = {name: size.of(name) ** 2 * each for name, each in typical.items()}
                 spread = view.normal.spread({**variance, **allowed})
                 self._weighed.append((view, size, Weighed(view.normal, spread)))
 
@@ -86,7 +108,7 @@ class Null:
     def _levels(self) -> FloatArray:
         """The log likelihood at every size, [nats]."""
         return np.array(
-            [w.log_likelihood() + v.log_volume + size_prior(k) for v, k, w in self._weighed]
+            [w.log_likelihood() + v.log_volume + k.log_prior for v, k, w in self._weighed]
         )
 
     @property
@@ -144,7 +166,7 @@ class Null:
         for view, size, weighed in self._weighed:
             if id(view) in of_view:
                 right, square = of_view[id(view)]
-                level = weighed.gain(right) - 0.5 * square + view.log_volume + size_prior(size)
+                level = weighed.gain(right) - 0.5 * square + view.log_volume + size.log_prior
                 yield level, weighed, right
 
     def _more(self, j: int, weighed: Weighed) -> FloatArray:
@@ -155,11 +177,11 @@ class Null:
         return np.full(block.stop - block.start, PRIOR**2)
 
     @property
-    def size(self) -> float:
+    def size(self) -> "Size":
         """The likeliest size of what this tire shows over what its family shows."""
-        return float(self._weighed[int(np.argmax(self._levels))][1])
+        return self._weighed[int(np.argmax(self._levels))][1]
 
-    def about(self, views: Sequence[View], size: float | None = None) -> "Null":
+    def about(self, views: Sequence[View], size: "Size | None" = None) -> "Null":
         """Return the same test of other normal equations, at one size of what the tire shows."""
         other = Null(views, self.family, self.allowed)
         if size is not None:
@@ -244,14 +266,11 @@ def standard(ratio: FloatArray, count: FloatArray) -> FloatArray:
     return np.asarray((np.cbrt(np.maximum(ratio, 0.0)) - (1.0 - spread)) / np.sqrt(spread))
 
 
-def _sizes(largest: float) -> list[float]:
+def _sizes(largest: float, blocks: Iterable[str]) -> list[Size]:
     """Return `SIZES`, and further ones up to the largest of a family's tires."""
-    out: list[float] = SIZES.tolist()
-    while out[-1] < largest:
-        out.append(2.0 * out[-1])
-    return out
-
-
-def size_prior(size: float) -> float:
-    """Return the log density of a tire's size, up to a constant."""
-    return float(-0.5 * (np.log(size) / SIZE_STD) ** 2)
+    whole: list[float] = SIZES.tolist()
+    while whole[-1] < largest:
+        whole.append(2.0 * whole[-1])
+    apart = APART if any(FREE in name for name in blocks) else (1.0,)
+    each = [Size(size, size * share) for size in whole for share in apart]
+    return [size for size in each if whole[0] <= size.free <= whole[-1]]

@@ -91,7 +91,7 @@ def next_test(
     trial = StrainTrial(
         tuple(_suspect(name, rival, hypotheses) for name, rival in rivals.items()),
         left_out,
-        hypotheses.base.null.size,
+        hypotheses.base.null.size.whole,
     )
     noise = Noise(float(np.mean(problem.noise)), problem.own_misfit(hypotheses.own))
     chosen = envelope.grid()

@@ -183,7 +183,7 @@ def selftest(
         problem.dead,
         {effect.name: twins_of(effect.name, base) for effect in problem.living},
         {e.name: plans.ratio(e.name, abs(e.toward) / e.scale) for e in problem.living},
-        base.null.size,
+        base.null.size.whole,
         float(np.mean(problem.noise)),
         false_alarm,
         repeats,

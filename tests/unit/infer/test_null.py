@@ -1,12 +1,15 @@
 """Standard scores, and the limit that plain tires of unlike families set."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from tests.unit.infer.linear_problem import Toy, drawn, family
+from tests.unit.infer.linear_problem import SHAPES, N, Toy, drawn, family
+from tirelib.arrays import FloatArray
+from tirelib.infer import null
 from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.null import standard
 from tirelib.infer.plain import Family
@@ -42,3 +45,36 @@ def test_the_limit_is_where_the_p_value_falls_to_the_level() -> None:
     limit = found.limit(0.05)
     assert found.p_of(float(np.nextafter(limit, np.inf)))[0] <= 0.05
     assert found.p_of(0.5 * limit)[0] > 0.05
+
+
+def test_the_free_belt_has_a_size_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What shows away from the contact only is as likely as what shows everywhere."""
+
+    class Belt(Toy):
+        def remainder(self, point: Any, solved: Any) -> dict[str, FloatArray]:
+            return {"smooth, contact": self.shapes, "smooth, free belt": self.there}
+
+    def belt(each: Family) -> Family:
+        """Return a family with as much on the free belt as in the contact."""
+        n = each.blocks["smooth, all"]
+        names = [*list(each.blocks)[:-2], "smooth, contact", "smooth, free belt"]
+        blocks = dict(zip(names, [1, 1, 1, n, n], strict=True))
+        squares = np.concatenate([each.squares[:, :-1], each.squares[:, -2:-1]], axis=1)
+        return replace(each, blocks=blocks, squares=squares)
+
+    def judged_by(families: tuple[Family, ...]) -> Hypothesis:
+        random = np.random.default_rng(2)
+        toy = Belt(random.standard_normal(N))
+        size = np.sqrt(families[0].spread()["smooth, free belt"])
+        toy.measured = toy.measured + 1.8 * size * random.standard_normal(SHAPES) @ toy.there
+        fit = posterior(toy, (), families[0].spread(), 0.001)
+        return judged(toy, fit, families, 0.05, own_effects=0)
+
+    families = tuple(belt(each) for each in FAMILIES)
+    apart = judged_by(families)
+    assert apart.null.size.free == 2.0 * apart.null.size.whole
+    monkeypatch.setattr(null, "APART", (1.0,))
+    together = judged_by(families)
+    assert together.null.size.free == together.null.size.whole
+    assert together.likelihood < apart.likelihood
+    assert together.scores["smooth, free belt"] >= apart.scores["smooth, free belt"]
