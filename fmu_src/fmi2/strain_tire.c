@@ -98,6 +98,7 @@ FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[]
 
 static fmi2Status get_whole(Slave *s, const fmi2ValueReference r[], size_t n, int v[], char kind) {
     if (!s || !allowed(s, r, n, kind, 0)) return fmi2Error;
+    slave_foresee(s);
     for (size_t i = 0; i < n; i++) v[i] = s->whole[r[i]];
     return fmi2OK;
 }
@@ -123,6 +124,7 @@ FMI2_EXPORT fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference r
                                      fmi2String v[]) {
     Slave *s = c;
     if (!s || !allowed(s, r, n, 'S', 0)) return fmi2Error;
+    slave_foresee(s);
     for (size_t i = 0; i < n; i++) v[i] = slave_text(s, r[i]);
     return fmi2OK;
 }

@@ -1,9 +1,12 @@
 """Programs in processes of their own, whose words and end are waited for, however long."""
 
+import fcntl
+import os
 import re
 import signal
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -81,11 +84,24 @@ class Line:
         run.says("samples a step")
         self._go.touch()
         self.wheel.says("played")
+        wait_until(lambda: not unread(self.port), f"the run to read all of {self.port}")
         run.says(A_TURN)  # from then on it ends in good order
         run.send_signal(signal.SIGINT)
         outcome = run.finish()
         assert self.wheel.finish()[0] == 0
         return outcome
+
+
+def unread(port: str) -> int:
+    """Return how many bytes nobody has read from a port; none where it cannot be asked."""
+    try:
+        asked = os.open(port, os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
+    except OSError:
+        return 0
+    try:
+        return int.from_bytes(fcntl.ioctl(asked, termios.FIONREAD, bytes(4)), sys.byteorder)
+    finally:
+        os.close(asked)
 
 
 def port_of(file: Path, wheel: Program | None = None) -> str:

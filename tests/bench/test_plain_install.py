@@ -32,7 +32,9 @@ def tirebench(*words: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_an_export_without_its_package_says_what_to_install(tmp_path: Path) -> None:
-    done = program("tirelib.cli", "fmu", "virtual", "--out", str(tmp_path / "V.fmu"))
+    done = program(
+        "tirelib.cli", "fmu", "virtual", "--python", "-q", "--out", str(tmp_path / "V.fmu")
+    )
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
         "Error: this command needs the package 'pythonfmu', which is not installed; install it "

@@ -108,7 +108,7 @@ try:
 except Exception as error:
     print(error)
 """,
-        unpacked(virtual_host.file(10), tmp_path / "x"),
+        unpacked(virtual_host.file(10, python=True), tmp_path / "x"),
     )
     assert "ModuleNotFoundError" in said
     assert "scipy" in said
@@ -155,7 +155,7 @@ def test_a_place_that_is_a_plain_path_or_has_a_host_will_do(folder: Path) -> Non
         ({"guid": "{00000000-0000-0000-0000-000000000000}"}, "come from different builds"),
         ({"guid": None}, "fmuGUID = missing"),
         ({"type": fmi2ModelExchange}, "fmuType is model exchange; this FMU is for co-simulation"),
-        ({"place": "file:///no/such/50%25"}, "unpack the whole FMU and give the URI of its folder"),
+        ({"place": "file:///no/such/50%25"}, "unpack the whole FMU and give the "),
         ({"place": None}, "fmuResourceLocation is missing"),
     ],
 )

@@ -5,6 +5,7 @@ import multiprocessing
 import shutil
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -110,7 +111,7 @@ def growth(path: str) -> tuple[int, int]:
     return after[0] - before[0], after[1] - before[1]
 
 
-@pytest.mark.parametrize("file", [python_file, virtual_host.file])
+@pytest.mark.parametrize("file", [python_file, partial(virtual_host.file, python=True)])
 def test_instances_come_and_go_without_growth(file: Callable[[int], Path]) -> None:
     # a process of its own: threads that other tests left make and drop objects meanwhile
     with multiprocessing.get_context("spawn").Pool(1) as pool:

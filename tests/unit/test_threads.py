@@ -119,7 +119,7 @@ def test_an_estimate_has_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_virtual_tire_in_an_importer_has_one_thread_and_leaves_the_importer_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    host = virtual_host.Host(virtual_host.file(10))
+    host = virtual_host.Host(virtual_host.file(10, python=True))
     seen = []
     inside = ".fmu.virtual.surface"
     name = next(n for n in sys.modules if n.endswith(inside) and n != f"tirelib{inside}")
