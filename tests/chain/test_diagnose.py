@@ -103,7 +103,7 @@ def test_without_repeats_nothing_is_named_and_the_noise_is_null(
     assert "no runs were repeated" in found.output
     names = [entry["effect"] for entry in told["candidates"]]
     assert max(map(len, names)) > 12
-    assert all(name in found.output for name in names), "names are told in full"
+    assert all(name in found.output for name in names), "names are printed in full"
 
 
 def test_bad_input_is_told(model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -264,7 +264,7 @@ def _provenance(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None:
-    """Print the estimators in use first, then the dissertation's regressions beside them."""
+    """Print the estimators in use first, then the dissertation's regressions for comparison."""
     console.print(_in_use_table(trained, document["in_use"]))
     if document["held_out"]:
         console.print(_held_out_table(document["held_out"]))

@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from tirelib.cli.common import NEW_PLACE, output, write_json
 from tirelib.cli.options import json_option
+from tirelib.cli.progress import EVERY
 from tirelib.errors import TirelibError
 
 if TYPE_CHECKING:
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
 FORMAT = "tirelib-fleet-run/1"
 TASKS = ("check", "features", "calibrate", "estimate", "identify", "compare", "diagnose")
-EVERY = 30.0
-"""Time between two lines of progress where there is no terminal, [s]."""
 SHOWN = 5
 
 _EXAMPLE = """\b

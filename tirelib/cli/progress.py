@@ -69,7 +69,7 @@ def _chosen() -> str:
 def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[[str], None]]:
     """Yield a callback that says that one step is done, and what it was.
 
-    With the environment variable `PROGRESS` set to "json", every step is a line of JSON on stderr:
+    If the environment variable `TIRELIB_PROGRESS` is "json", each step prints JSON on stderr:
     what is done, the number of steps so far, of all steps (or null), and the label.
     """
     chosen = _chosen()

@@ -186,16 +186,18 @@ def _slopes(
     values: Mapping[str, float | FloatArray],
     free: tuple[Coordinate, ...],
 ) -> FloatArray:
-    """Return central differences of a measure by the free coordinates, (n_measured, n_free)."""
+    """Return differences of a measure within a tire's ranges, (n_measured, n_free)."""
     tire = _tire(values)
     columns = []
     for coordinate in free:
         value = float(np.max(values[coordinate.name]))
+        low, high = coordinate.ends(value)
+        steps = max(-STEP, low), min(STEP, high)
         ends = [
             np.asarray(
                 measure(tire.changed(**{coordinate.name: float(coordinate.moved(value, z))}))
             )
-            for z in (-STEP, STEP)
+            for z in steps
         ]
-        columns.append((ends[1] - ends[0]) / (2.0 * STEP))
+        columns.append((ends[1] - ends[0]) / (steps[1] - steps[0]))
     return np.stack(columns, axis=1)

@@ -14,6 +14,7 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.errors import ConvergenceError, TirelibError
+from tirelib.identify.bounded import bounded_step
 from tirelib.identify.delay import earlier
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.fit_cost import Cost, Data
@@ -151,7 +152,7 @@ def fit_waveforms(
 
 
 class Solver:
-    """Levenberg-Marquardt over the free coordinates z; the cost follows the solution."""
+    """Levenberg-Marquardt over the free coordinates z within their ranges; the cost follows."""
 
     def __init__(
         self,
@@ -166,6 +167,8 @@ class Solver:
         self.discrepancy = discrepancy
         self.start = dict(start)
         self.z = np.zeros(len(free))
+        ends = [c.ends(float(np.max(self.start[c.name]))) for c in free]
+        self.low, self.high = np.array(ends).reshape(-1, 2).T
         self.delay = 0.0
         self.damping = 1e-3
         self.idle = 0
@@ -223,14 +226,15 @@ class Solver:
             If the model has no solution anywhere near.
         """
         deviation = np.minimum(np.sqrt(np.diag(np.linalg.inv(self.normal))) + 1e-6, 1.0)
-        wanted = np.linalg.solve(self.normal, self.gradient)
+        within = self.low - self.z, self.high - self.z
+        wanted = bounded_step(self.normal, self.gradient, *within)
         far = float(np.abs(wanted / deviation).max())
         if far < SETTLED:
             return far
         refused: TirelibError | None = None
         while self.damping < LARGEST_DAMPING:
             damped = self.normal + self.damping * np.diag(np.diag(self.normal))
-            dz = np.linalg.solve(damped, self.gradient)
+            dz = bounded_step(damped, self.gradient, *within)
             dz = dz * min(1.0, LONGEST_STEP / max(float(np.abs(dz).max()), 1e-300))
             try:
                 model = self.at(self.z + dz)

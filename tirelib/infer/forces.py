@@ -131,6 +131,7 @@ class ForceProblem:
         self.names = tuple(name for name in COORDINATES[quantity] if name not in out)
         self.start = Point(np.zeros(len(self.names)), tuple(effects), tuple(strengths))
         self.widths = np.full(len(self.names), WIDTH)
+        self.ends = -np.full(len(self.names), np.inf), np.full(len(self.names), np.inf)
         self.size = float(np.sqrt(np.mean(self.measured**2))) * load / np.sqrt(np.mean(load**2))
         self.noise = noise if np.isfinite(noise) else UNKNOWN_NOISE * float(np.mean(self.size))
         self.dead: dict[str, str] = {}

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import optimize
 
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, TirelibError
+from tirelib.identify.bounded import bounded_step
 from tirelib.infer.normal import LEAST, Normal, Weighed
 from tirelib.infer.plain import BASE, ROUGHLY, View
 from tirelib.infer.problem import Point, Problem
@@ -185,7 +185,7 @@ def posterior(
     widths = [problem.widths, np.ones(sum(e.components for e in effects))]
     widths += [np.full(e.components, np.sqrt(max(spread.get(e.name, 0.0), LEAST))) for e in others]
     width = np.concatenate(widths)
-    low, high = _ends(others, len(width))
+    low, high = _ends(problem, others, len(width))
     solved = problem.solve(point, near.solved if near else None)
     known = None if near is None or strengths is not None else near.slopes_at(point)
     slopes = problem.slopes(point, solved) if known is None else known
@@ -209,13 +209,13 @@ def posterior(
         cost = _cost(metric, normal.right, normal.square, here, width)
         deviation = np.sqrt(np.diag(np.linalg.inv(gram)))
         within = low - here, high - here
-        trial, dz = None, _step(gram, gradient, *within)
+        trial, dz = None, bounded_step(gram, gradient, *within)
         promised = _fall(gram, gradient, dz)
         little = settled * max(1.0, cost / rest.size)
         there = promised < little
         there = there and bool((np.abs(dz[asked]) < STILL * deviation[asked]).all())
         while not there and damping < HARDEST:
-            dz = _step(gram + damping * np.diag(np.diag(gram)), gradient, *within)
+            dz = bounded_step(gram + damping * np.diag(np.diag(gram)), gradient, *within)
             share = min(1.0, LONGEST / float(np.abs(dz).max()))
             tried = _tried(problem, point, share * dz, solved)
             if tried is not None:
@@ -319,26 +319,17 @@ def coordinates_of(point: Point) -> FloatArray:
     return np.concatenate([point.base, *ranges])
 
 
-def _ends(others: Sequence[Effect], count: int) -> tuple[FloatArray, FloatArray]:
-    """Return the ends of all coordinates: what a tire shows of an effect is within its range."""
+def _ends(problem: Problem, others: Sequence[Effect], count: int) -> tuple[FloatArray, FloatArray]:
+    """Return the ends of all coordinates: the base's, and what a tire shows is within its range."""
     low, high = np.full(count, -np.inf), np.full(count, np.inf)
+    base = slice(0, len(problem.widths))
+    low[base], high[base] = problem.ends
     first = count - sum(effect.components for effect in others)
     for effect in others:
         rows = slice(first, first + effect.components)
         low[rows], high[rows] = effect.low / effect.scale, effect.high / effect.scale
         first += effect.components
     return low, high
-
-
-def _step(gram: FloatArray, gradient: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the step to the bottom of a quadratic cost between ends."""
-    lower = np.linalg.cholesky(gram)
-    free = np.asarray(np.linalg.solve(gram, gradient))
-    if ((free >= low) & (free <= high)).all():
-        return free
-    target = np.linalg.solve(lower, gradient)
-    ends = (np.minimum(low, 0.0), np.maximum(high, 1e-12))
-    return np.asarray(optimize.lsq_linear(lower.T, target, ends, method="bvls").x)
 
 
 def _fall(gram: FloatArray, gradient: FloatArray, dz: FloatArray) -> float:

@@ -66,6 +66,10 @@ class Problem(Protocol):
         """Prior standard deviations of the base's coordinates, shape (n_base,)."""
 
     @property
+    def ends(self) -> tuple[FloatArray, FloatArray]:
+        """Ends of the base's coordinates, shape (n_base,) each; infinite where there is none."""
+
+    @property
     def dead(self) -> Mapping[str, str]:
         """Effects that this plan cannot show, with the reason."""
 

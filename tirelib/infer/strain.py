@@ -182,6 +182,9 @@ class StrainProblem:
         self.free = coordinates(values)
         self.start = Point(np.zeros(len(self.free) + 1), tuple(effects), tuple(strengths))
         self.widths = np.array([*(WIDTH[c.name] for c in self.free), STD / UNIT])
+        ends = [c.ends(float(np.max(values[c.name]))) for c in self.free]
+        low, high = np.array([*ends, (-np.inf, np.inf)]).T  # a delay has none
+        self.ends = low, high
         typical = float(np.sqrt(np.mean(runs.strain**2)))
         noise = runs.noise.std if runs.noise.known else UNKNOWN_NOISE * typical
         self._last: tuple[StrainSolved, SolutionSlopes] | None = None

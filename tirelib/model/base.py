@@ -9,7 +9,7 @@ from tirelib.arrays import FloatArray
 from tirelib.contact.free_boundary import Start
 from tirelib.model.chain import Changes, waveform
 from tirelib.model.state import Operating, State
-from tirelib.parameters import Tire
+from tirelib.parameters import FIELDS, Tire
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID, Waveforms
 
@@ -36,6 +36,17 @@ class Coordinate:
     def distance(self, value: float | FloatArray, other: float | FloatArray) -> float | FloatArray:
         """Return the move z from a value to another."""
         return np.log(other / value) if self.unit == 0.0 else (other - value) / self.unit
+
+    def ends(self, value: float) -> tuple[float, float]:
+        """Return the moves z from a value to the ends of the parameter's range (`FIELDS`)."""
+        field = FIELDS[self.name]
+        if self.unit == 0.0:  # a factor keeps the sign
+            side = (field.lowest, field.highest) if value > 0.0 else (-field.highest, -field.lowest)
+            with np.errstate(divide="ignore"):
+                low, high = np.log(np.maximum(side, 0.0) / abs(value))
+        else:
+            low, high = ((x - value) / self.unit for x in (field.lowest, field.highest))
+        return min(float(low), 0.0), max(float(high), 0.0)
 
     def spread(self, value: float, std: float) -> float:
         """Return a standard deviation of z as one of the value."""

@@ -19,7 +19,7 @@ from tirelib.identify.waveform_fit import (
     WaveformFit,
     fit_waveforms,
 )
-from tirelib.model.base import BARE, FREE, predict, values_of
+from tirelib.model.base import BARE, FREE, Coordinate, predict, values_of
 from tirelib.model.solution import slopes_of
 from tirelib.waveforms import GRID
 
@@ -292,3 +292,18 @@ def test_a_cost_that_follows_the_solution_is_kept_in_the_end(
         plain(data(loads=LOADS[::2]))
     kept = waveform_fit.FOLLOWED
     assert renewed == [True] * kept + [False] * (waveform_fit.MAX_STEPS - kept)
+
+
+def test_a_fit_stays_in_the_ranges_of_a_tire(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The liner that the strain asks for lies further off than it may."""
+    offset, wanted = BARE[6], float(TIRE.innerliner_offset)
+    assert offset.name == "innerliner_offset"
+    low, high = offset.ends(START.innerliner_offset)
+    assert low < offset.distance(START.innerliner_offset, wanted) < high
+    end = 0.5 * float(offset.distance(START.innerliner_offset, wanted))
+    side = (-np.inf, end) if end > 0.0 else (end, np.inf)
+    monkeypatch.setattr(
+        Coordinate, "ends", lambda self, _: side if self == offset else (-np.inf, np.inf)
+    )
+    fit = plain(data())
+    assert offset.distance(START.innerliner_offset, fit.values[offset.name]) == pytest.approx(end)

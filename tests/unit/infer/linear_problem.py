@@ -67,6 +67,7 @@ class Toy:
             self.by["bend"] = self.by["twist"] + 1e-6 * self.by["bend"]
         self.start = Point(np.zeros(3))
         self.widths = np.full(3, 10.0)
+        self.ends = np.full(3, -np.inf), np.full(3, np.inf)
         self.dead: Mapping[str, str] = {}
         self.living = tuple(EFFECTS.values())
 

@@ -5,7 +5,8 @@ import pytest
 from scipy import optimize
 
 from tests.unit.infer.linear_problem import EFFECTS, N, Toy, drawn, family
-from tirelib.infer.posterior import _step, posterior
+from tirelib.identify.bounded import bounded_step
+from tirelib.infer.posterior import posterior
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 SPREAD = FAMILIES[0].spread()
@@ -37,7 +38,7 @@ def test_a_step_between_ends_is_the_bottom_there() -> None:
     half = random.standard_normal((6, 9))
     gram, gradient = half @ half.T, random.standard_normal(6)
     low, high = np.full(6, -0.1), np.array([0.05, 0.1, 0.2, np.inf, np.inf, 0.0])
-    found = _step(gram, gradient, low, high)
+    found = bounded_step(gram, gradient, low, high)
     assert ((found >= low - 1e-9) & (found <= high + 1e-9)).all()
 
     def cost(dz: np.ndarray) -> float:

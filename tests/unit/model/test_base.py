@@ -21,6 +21,7 @@ from tirelib.model.base import (
     values_of,
 )
 from tirelib.model.state import State
+from tirelib.parameters import FIELDS
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID
 
@@ -167,3 +168,23 @@ def test_a_law_that_no_deflection_satisfies_is_refused() -> None:
     with pytest.raises(ConvergenceError, match="constants that follow the deflection") as caught:
         predict(VALUES, POINTS, [("constants", jumps)])
     assert caught.value.residual > chain.SETTLED
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "value"),
+    [
+        ("creep", 0.0, 0.02),
+        ("innerliner_offset", 0.0, -0.003),
+        ("bending_stiffness", 0.0, 2.0),
+        ("tread_poisson", 0.3, 0.1),
+    ],
+)
+def test_moves_end_where_the_range_does(name: str, unit: float, value: float) -> None:
+    coordinate, field = Coordinate(name, unit), FIELDS[name]
+    low, high = coordinate.ends(value)
+    assert low < 0.0 < high
+    reached = sorted(float(coordinate.moved(value, z)) for z in (low, high) if np.isfinite(z))
+    limits = [x for x in (field.lowest, field.highest) if unit or x * value > 0.0]
+    assert reached == pytest.approx([x for x in limits if np.isfinite(x)])
+    at_end = float(coordinate.moved(value, high)) if np.isfinite(high) else value
+    assert coordinate.ends(at_end)[1] == pytest.approx(0.0 if np.isfinite(high) else high)
