@@ -44,7 +44,16 @@ STATIC = {
                 "heat.js",
                 "maps.js",
             ),
-            *("open.js", "import.js", "see.js", "suspect.js", "add.js", "take.js"),
+            *(
+                "open.js",
+                "import.js",
+                "see.js",
+                "suspect.js",
+                "effect.js",
+                "add.js",
+                "compare.js",
+                "take.js",
+            ),
         )
     },
 }

@@ -1,12 +1,17 @@
 // Step 4: the refit while it runs, the fall of the error, and every model that was made.
-import { app, current, documentOf, nameOf, progressOf, wish } from "./data.js";
-import { choose, csvButton, dialog, fill, h, number, strength, unitName } from "./dom.js";
+import { compareModels } from "./compare.js";
+import { app, current, nameOf, progressOf, VERDICTS, wish } from "./data.js";
+import { csvButton, fill, h, number, strength, unitName } from "./dom.js";
 import { Plot, waterfall } from "./plots.js";
 
 const FLAGS = {
   out_of_range: "The fitted strength lies outside the plausible range: another effect may be missing.", not_significant: "The fitted strength does not differ significantly from zero.",
-  no_gain: "The effect does not lower the error.", heldout_worse: "The effect raises the error on the held-out runs: it may stand for another one.",
+  no_gain: "The effect does not lower the error.",
+  heldout_worse: "On a part of the runs that was held out the error rose: there the effect may stand for another one.",
 };
+
+// What was held out, part by part, in a sentence.
+const heldOut = (fit) => (fit.held_out || []).map((part) => `${part.condition.replaceAll("_", " ")} ${number(part.value, 3)} ${part.unit || ""} (${part.runs} runs): ${number(part.error_before, 3)} before, ${number(part.error_after, 3)} after`).join("; ");
 
 export class Add {
   constructor(go) {
@@ -72,14 +77,14 @@ export class Add {
     fill(this.fall, h("div", { class: "row" }, h("h2", {}, "The fall of the error"), h("span", { class: "quiet" }, c.quantity), h("span", { class: "room" }),
       csvButton("waterfall", () => [["step", steps.map((s) => s.name)], [`error [${unit}]`, steps.map((s) => s.error)], ["held-out error", steps.map((s) => s.heldout)], ["floor", steps.map((s) => s.floor)]])),
     steps.length ? waterfall(steps, unit) : h("p", { class: "quiet" }, "There is no model yet."),
-    last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(last.std, 2)}${last.unit === "1" ? "" : ` ${last.unit}`}. Error ${number(last.error_before, 4)} before, `, h("b", { id: "error-after" }, number(last.error_after, 4)), ` after [${unitName(last.error_unit)}]. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after.`) : null,
+    last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(last.std, 2)}${last.unit === "1" ? "" : ` ${last.unit}`}. Error ${number(last.error_before, 4)} before, `, h("b", { id: "error-after" }, number(last.error_after, 4)), ` after [${unitName(last.error_unit)}]. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after${last.held_out?.length ? `; of it ${heldOut(last)}` : ""}.`) : null,
     last?.flags?.length ? h("p", { class: "warn" }, last.flags.map((flag) => FLAGS[flag] || flag.replaceAll("_", " ")).join(" ")) : null,
-    now?.verdict ? h("p", {}, "With this model the verdict is ", h("b", {}, now.verdict.replaceAll("_", " ")), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", h("a", { href: `#/suspect/${app.wanted}` }, "See the suspects again")) : now ? h("p", { class: "quiet" }, "The verdict of this model is being computed.") : null,
+    now?.verdict ? h("p", {}, "The verdict with this model: ", h("b", {}, VERDICTS[now.verdict] || now.verdict), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", h("a", { href: `#/suspect/${app.wanted}` }, "See the suspects again")) : now ? h("p", { class: "quiet" }, "The verdict of this model is being computed.") : null,
     failed.map((job) => h("p", { class: job.state === "failed" ? "bad" : "warn" }, `${job.kind} ${job.effect}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: job.job }) }, "Run again"))));
     const shown = c.models.filter((m) => m.ready && (this.hidden || !m.hidden));
     fill(this.strip, h("div", { class: "row" }, h("h2", {}, "Models"), h("span", { class: "quiet small" }, "Nothing is deleted. Continue from any of them."), h("span", { class: "room" }),
       now?.parent ? h("button", { type: "button", id: "undo", onclick: () => this.look(c.models.find((m) => m.number === now.parent)) }, "Undo: back to the model before") : null,
-      h("button", { type: "button", onclick: () => this.compare(c, shown) }, "Compare two"),
+      h("button", { type: "button", disabled: shown.length < 2, onclick: () => compareModels(c, shown) }, "Compare two"),
       h("label", {}, h("input", { type: "checkbox", checked: this.hidden, onchange: (e) => { this.hidden = e.target.checked; this.history(c); } }), " show hidden ones")),
     h("div", { class: "strip" }, [...shown].sort((a, b) => b.pinned - a.pinned || (a.number < b.number ? -1 : 1)).map((m) => this.card(c, m))));
   }
@@ -96,21 +101,4 @@ export class Add {
   }
 
   look(model) { wish({ do: "look", campaign: app.campaign.campaign, model: model.number, quantity: app.campaign.quantity }); }
-
-  compare(c, models) {
-    const pick = { a: models[0]?.number, b: c.current !== models[0]?.number ? c.current : models.at(-1)?.number }, body = h("div", {});
-    const options = models.map((m) => [m.number, `${m.number} ${nameOf(m)}`]);
-    const draw = async () => {
-      const both = [pick.a, pick.b].map((n) => c.models.find((m) => m.number === n));
-      const told = await Promise.all(both.map((m) => documentOf(m, "comparison").catch(() => null)));
-      const line = (text, value) => h("tr", {}, h("td", {}, text), told.map((t, i) => h("td", {}, value(t, both[i]) ?? "–")));
-      const runs = new Map();
-      told.forEach((t, i) => (t?.runs || t?.curves || []).forEach((r) => { const key = r.run ?? r.words; if (!runs.has(key)) runs.set(key, [null, null]); runs.get(key)[i] = r.rms_noise ?? r.rms; }));
-      fill(body, h("table", {}, h("tbody", {}, h("tr", {}, h("th", {}, ""), both.map((m) => h("th", {}, nameOf(m)))),
-        line("error", (t) => t && `${number(t.error, 4)} ${unitName(t.error_unit)}`), line("not explained, rms", (t) => t && `${number(t.residual_rms)} ${unitName(t.unit)}`), line("effects", (t) => t && (t.effects.map((e) => `${e.effect} ${strength(e.strength)}`).join("; ") || "none")), line("verdict", (_, m) => m.verdict?.replaceAll("_", " ")), line("held-out error", (_, m) => m.fit?.heldout_error_after && number(m.fit.heldout_error_after, 4)))),
-      h("h3", {}, "Each part of the measurement, rms over the noise"), h("div", { class: "scroll" }, h("table", {}, h("tbody", {}, [...runs.entries()].map(([run, [x, y]]) => h("tr", {}, h("td", {}, run), h("td", { class: "n" }, number(x)), h("td", { class: "n" }, number(y)), h("td", { class: y < x ? "good" : "warn" }, x && y ? (y < x ? "▼ lower" : y > x ? "▲ higher" : "the same") : "")))))));
-    };
-    dialog("Two models side by side", h("div", { class: "row" }, choose(options, pick.a, (v) => { pick.a = v; draw(); }, "left"), choose(options, pick.b, (v) => { pick.b = v; draw(); }, "right")), body);
-    draw();
-  }
 }

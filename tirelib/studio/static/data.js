@@ -4,7 +4,7 @@ import { toast } from "./dom.js";
 export const app = { home: null, campaign: null, running: [], connected: false };
 const listeners = new Set();
 export const listen = (what) => { listeners.add(what); return () => listeners.delete(what); };
-const tell = (what) => listeners.forEach((one) => one(what));
+export const tell = (what) => listeners.forEach((one) => one(what));
 
 async function answer(response) {
   if (response.ok) return response;
@@ -28,9 +28,10 @@ export async function wish(what) {
   }
 }
 
-export async function upload(files) {
+export async function upload(files, say) {
   let number = "";
-  for (const [name, file] of files) {
+  for (const [k, [name, file]] of files.entries()) {
+    say(k + 1);
     const query = new URLSearchParams({ name, files: number });
     number = (await (await answer(await fetch(`/upload?${query}`, { method: "POST", body: file }))).json()).files;
   }
@@ -52,6 +53,12 @@ export async function refresh() {
   busy = false;
   if (again) { again = false; refresh(); }
 }
+
+// The verdicts of a diagnosis in plain words.
+export const VERDICTS = {
+  none: "no effect is missing", named: "one effect is missing", indistinguishable: "several effects explain it alike",
+  form_inadequate: "the effect is right, its law is not", unknown: "no effect of the catalogue explains it",
+};
 
 export const current = () => {
   const c = app.campaign;

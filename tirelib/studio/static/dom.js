@@ -34,6 +34,10 @@ export function strength(value, digits = 3) {
 const UNITS = { noise: "× noise", ustrain: "microstrain" };
 export const unitName = (unit) => UNITS[unit] || unit || "";
 
+// On a large screen everything is larger, plots by the height of the window.
+export const large = () => window.innerWidth >= 2200;
+export const tall = () => (large() ? Math.max(1.8, window.innerHeight / 850) : 1);
+
 let timer = 0;
 export function toast(text, bad = false) {
   const place = document.getElementById("toast");

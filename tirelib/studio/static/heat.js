@@ -1,5 +1,5 @@
 // A heat map on a canvas: rows of numbers over an axis; a cell is chosen by click or by the arrow keys.
-import { h, number, fill } from "./dom.js";
+import { fill, h, number, tall } from "./dom.js";
 
 const BLUE_RED = [[33, 102, 172], [146, 197, 222], null, [244, 165, 130], [178, 24, 43]];
 const CIVIDIS = [[0, 32, 77], [67, 78, 108], [124, 123, 120], [187, 175, 113], [255, 234, 70]];
@@ -33,7 +33,7 @@ export class Heat {
     this.canvas = h("canvas", { tabindex: "0", role: "application", "aria-label": label });
     this.tip = h("div", { class: "tip", "aria-live": "polite" });
     this.element = h("div", { class: "heat" }, this.canvas, this.tip);
-    this.height = (window.innerWidth >= 2200 ? 1.8 : 1) * height; this.left = 90; this.choose = choose; this.hover = hover; this.brush = brush;
+    this.height = tall() * height; this.left = 90; this.choose = choose; this.hover = hover; this.brush = brush;
     this.at = { row: 0, column: 0 }; this.range = null; this.colors = "diverging";
     this.canvas.addEventListener("pointermove", (event) => this.moved(event));
     this.canvas.addEventListener("pointerdown", (event) => this.pressed(event));

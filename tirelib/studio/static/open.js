@@ -1,9 +1,10 @@
 // Step 1: a campaign of the list, a folder, files that are dropped, or the example.
-import { app, get, progressOf, shown, upload, wish } from "./data.js";
+import { app, get, progressOf, shown, tell, upload, wish } from "./data.js";
 import { dialog, fill, h, number, toast } from "./dom.js";
 import { importForm } from "./import.js";
 
-async function entries(transfer) {
+// Every file of a drop with its place in the folder that was dropped.
+export async function entries(transfer) {
   const out = [];
   async function walk(entry, path) {
     if (entry.isFile) {
@@ -21,15 +22,35 @@ async function entries(transfer) {
   return out;
 }
 
+let reading = ""; // what is said while files are sent
+
+// Send files to the server, and open what they are: a campaign, an effect, or files to be imported.
+export async function receive(files, go) {
+  if (!files.length) return;
+  try {
+    const number = await upload(files, (k) => { reading = `Reading file ${k} of ${files.length}`; tell("progress"); });
+    opened(await wish({ do: "dropped", files: number }), go);
+  } catch (error) { toast(error.message, true); }
+  reading = "";
+  tell("progress");
+}
+
+function opened(done, go) {
+  if (!done) return;
+  if (done.campaign) go("open", done.campaign);
+  else if (done.effect) confirmEffect(done.effect);
+  else if (done.files) importForm(done.files);
+}
+
 export class Open {
   constructor(go) {
     this.go = go;
     this.start = h("div", { class: "card" });
     this.recent = h("div", { class: "card" });
     this.facts = h("div", {});
-    this.picker = h("input", { type: "file", multiple: true, hidden: true, onchange: (event) => this.take([...event.target.files].map((f) => [f.name, f])) });
+    this.picker = h("input", { type: "file", multiple: true, hidden: true, onchange: (event) => receive([...event.target.files].map((f) => [f.name, f]), this.go) });
     this.zone = h("div", { class: "drop", tabindex: "0", role: "button", onclick: () => this.picker.click(), onkeydown: (event) => { if (event.key === "Enter" || event.key === " ") this.picker.click(); } },
-      "Drop a campaign folder, its zip archive, measured files (MAT, CSV, Parquet, TYDEX, MDF) or an effect file (.py) here, or click to choose files");
+      "Drop a campaign folder, its zip archive, measured files (MAT, CSV, Parquet, TYDEX, MDF) or an effect file (.py) anywhere on this page, or click here to choose files");
     this.element = h("div", { class: "two" }, h("div", {}, this.start, this.recent), this.facts);
     fill(this.start, h("h2", {}, "Measurements"), h("p", {}, "A campaign is a folder with campaign.toml, runs.csv and the recorded runs. Other files are imported."),
       h("div", { class: "row" },
@@ -37,13 +58,6 @@ export class Open {
         h("button", { type: "button", id: "browse", onclick: () => this.browse("") }, "Choose a folder or file …")),
       h("p", { class: "quiet small" }, "The example measures a virtual tire, on this machine and now, that has a physical effect which the base model lacks. It takes less than a minute on an idle machine."),
       this.zone, this.picker, this.progressLine = h("p", { role: "status" }));
-    for (const kind of ["dragenter", "dragover"]) this.zone.addEventListener(kind, (event) => { event.preventDefault(); this.zone.classList.add("over"); });
-    this.zone.addEventListener("dragleave", () => this.zone.classList.remove("over"));
-    this.zone.addEventListener("drop", async (event) => {
-      event.preventDefault();
-      this.zone.classList.remove("over");
-      this.take(await entries(event.dataTransfer));
-    });
     this.shownFor = "";
   }
 
@@ -53,48 +67,32 @@ export class Open {
     else if (done?.job) app.follow = done.job;
   }
 
-  async take(files) {
-    if (!files.length) return;
-    this.progressLine.textContent = `Reading ${files.length} files`;
-    try {
-      const number = await upload(files);
-      this.taken(await wish({ do: "dropped", files: number }));
-    } catch (error) { toast(error.message, true); }
-    this.progressLine.textContent = "";
-  }
-
-  taken(done) {
-    if (!done) return;
-    if (done.campaign) this.go("open", done.campaign);
-    else if (done.effect) confirmEffect(done.effect);
-    else if (done.files) importForm(done.files);
-  }
-
   async browse(path) {
     let found;
     try { found = await get("/browse", { path }); } catch (error) { toast(error.message, true); return; }
     const open = async (folder) => {
       const done = await wish({ do: "open", path: folder });
-      if (done) { document.getElementById("dialog").close(); this.taken(done); }
+      if (done) { document.getElementById("dialog").close(); opened(done, this.go); }
     };
     dialog("Choose a campaign", h("p", { class: "quiet" }, found.path || "Folders that the server may read (tirelib studio --root adds others)"),
       found.campaign ? h("button", { class: "main", type: "button", onclick: () => open(found.path) }, "Open this campaign") : null,
       h("ul", { class: "list scroll" },
         found.path ? h("li", {}, h("button", { class: "link", type: "button", onclick: () => this.browse(found.parent) }, "↑ up")) : null,
         found.folders.map((one) => h("li", {}, h("button", { class: "link", type: "button", onclick: () => (one.campaign ? open(one.path) : this.browse(one.path)) }, one.name), one.campaign ? h("span", { class: "tag" }, "campaign") : null)),
-        found.files.map((one) => h("li", {}, h("button", { class: "link", type: "button", onclick: async () => { const done = await wish({ do: "columns", path: one.path }); document.getElementById("dialog").close(); this.taken(done); } }, one.name), h("span", { class: "quiet" }, "import"))),
+        found.files.map((one) => h("li", {}, h("button", { class: "link", type: "button", onclick: async () => { const done = await wish({ do: "columns", path: one.path }); document.getElementById("dialog").close(); opened(done, this.go); } }, one.name), h("span", { class: "quiet" }, "import"))),
         !found.folders.length && !found.files.length ? h("li", { class: "quiet" }, "This folder holds no folders and no measured files.") : null));
   }
 
   progress() {
-    if (!app.follow) return;
-    const at = progressOf(app.follow);
-    if (at) this.progressLine.textContent = `The virtual tire is measured: ${at.label || "it begins"}`;
+    const at = app.follow && progressOf(app.follow);
+    const title = app.home?.jobs.find((job) => job.job === app.follow)?.title;
+    this.progressLine.textContent = reading || (at && title ? `${title}: ${at.label || "it begins"}` : "");
   }
 
   update() {
     const home = app.home;
     if (!home) return;
+    this.progress();
     const broken = home.jobs.filter((job) => ["interrupted", "failed", "cancelled"].includes(job.state) && ["rig", "import"].includes(job.kind)).slice(-3);
     fill(this.recent, h("h2", {}, "Recent campaigns"),
       home.campaigns.length ? h("ul", { class: "list" }, home.campaigns.map((one) => h("li", {},

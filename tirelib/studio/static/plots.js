@@ -1,22 +1,21 @@
 // Lines, points and bars with uPlot: one look, units on every axis, data as CSV.
-import { csvButton, fill, h, number } from "./dom.js";
+import { csvButton, fill, h, large, number, tall } from "./dom.js";
 
 export const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const live = new Set();
 new ResizeObserver(() => live.forEach((plot) => plot.fit())).observe(document.documentElement);
 new MutationObserver(() => live.forEach((plot) => plot.renew())).observe(document.documentElement, { attributes: true, attributeFilter: ["data-theme"] });
 
-const big = () => window.innerWidth >= 2200;
 const axis = (label, extra = {}) => ({
   stroke: () => color("quiet"), grid: { stroke: () => color("grid"), width: 1 }, ticks: { stroke: () => color("line"), width: 1 },
-  font: `${big() ? 16 : 12}px system-ui, sans-serif`, labelFont: `${big() ? 16 : 12}px system-ui, sans-serif`,
-  label, labelSize: big() ? 24 : 18, size: big() ? 66 : 52, ...extra,
+  font: `${large() ? 16 : 12}px system-ui, sans-serif`, labelFont: `${large() ? 16 : 12}px system-ui, sans-serif`,
+  label, labelSize: large() ? 24 : 18, size: large() ? 66 : 52, ...extra,
 });
 
 // series: [{name, values, color, dash, points, width, fill}], bands: [[upper, lower, color]]
 export class Plot {
   constructor(name, { height = 210, select = null, points = false, chosen = null } = {}) {
-    this.name = name; this.height = (big() ? 1.8 : 1) * height; this.select = select; this.points = points; this.chosen = chosen;
+    this.name = name; this.height = tall() * height; this.select = select; this.points = points; this.chosen = chosen;
     this.head = h("span");
     this.place = h("div");
     this.legend = h("div", { class: "legend" });
@@ -46,12 +45,12 @@ export class Plot {
       width: Math.max(200, this.place.clientWidth || 500), height: this.height, legend: { show: false },
       cursor: { drag: { x: Boolean(this.select), y: false, setScale: false }, points: { show: !this.points }, dataIdx: undefined },
       scales: { x: { time: false, range: told.x.range ? () => told.x.range : undefined } },
-      axes: [axis(told.x.title, { size: big() ? 44 : 34 }), axis(told.y || told.unit)],
+      axes: [axis(told.x.title, { size: large() ? 44 : 34 }), axis(told.y || told.unit)],
       bands: (told.bands || []).map(([upper, lower, paint]) => ({ series: [upper, lower], fill: () => `${color(paint)}2e` })),
       series: [{ label: told.x.title }, ...told.series.map((one) => ({
         label: one.name, stroke: () => color(one.color), width: one.width ?? 2, dash: one.dash,
         paths: one.points ? () => null : undefined,
-        points: one.points ? { show: true, size: big() ? 11 : 8, width: 2, stroke: () => color(one.color), fill: () => (one.hollow ? color("card") : color(one.color)) } : { show: false },
+        points: one.points ? { show: true, size: large() ? 11 : 8, width: 2, stroke: () => color(one.color), fill: () => (one.hollow ? color("card") : color(one.color)) } : { show: false },
       }))],
       hooks: {
         setSelect: [(plot) => {
@@ -84,23 +83,23 @@ export function waterfall(steps, unit) {
   const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, class: "waterfall", role: "img", "aria-label": `Error by step: ${steps.map((s) => `${s.name} ${number(s.error)}`).join(", ")} ${unit}` });
   for (let i = 0; i <= 4; i += 1) {
     const value = (high * i) / 4.48;
-    svg.append(make("line", { x1: left, x2: width - 8, y1: up(value), y2: up(value), stroke: color("grid") }), make("text", { x: left - 6, y: up(value) + 4, "text-anchor": "end", "font-size": 12, fill: color("quiet") }, number(value, 2)));
+    svg.append(make("line", { x1: left, x2: width - 8, y1: up(value), y2: up(value), stroke: "var(--grid)" }), make("text", { x: left - 6, y: up(value) + 4, "text-anchor": "end", "font-size": 12, fill: "var(--quiet)" }, number(value, 2)));
   }
   const room = (width - left - 8) / Math.max(steps.length, 2);
   steps.forEach((step, i) => {
     const x = left + i * room + 0.15 * room, wide = 0.5 * room;
     if (Number.isFinite(step.error)) {
       const before = i ? steps[i - 1].error : null;
-      if (Number.isFinite(before) && before > step.error) svg.append(make("rect", { x, y: up(before), width: wide, height: up(step.error) - up(before), fill: "none", stroke: color("quiet"), "stroke-dasharray": "4 3" }));
-      svg.append(make("rect", { x, y: up(step.error), width: wide, height: up(0) - up(step.error), fill: color("model") }), make("text", { x: x + wide / 2, y: up(step.error) - 4, "text-anchor": "middle", "font-size": 13, "font-weight": 600, fill: color("text") }, number(step.error)));
+      if (Number.isFinite(before) && before > step.error) svg.append(make("rect", { x, y: up(before), width: wide, height: up(step.error) - up(before), fill: "none", stroke: "var(--quiet)", "stroke-dasharray": "4 3" }));
+      svg.append(make("rect", { x, y: up(step.error), width: wide, height: up(0) - up(step.error), fill: "var(--model)" }), make("text", { x: x + wide / 2, y: up(step.error) - 4, "text-anchor": "middle", "font-size": 13, "font-weight": 600, fill: "var(--text)" }, number(step.error)));
     }
-    if (Number.isFinite(step.floor)) svg.append(make("line", { x1: x - 4, x2: x + wide + 4, y1: up(step.floor), y2: up(step.floor), stroke: color("text"), "stroke-width": 2, "stroke-dasharray": "2 3" }));
+    if (Number.isFinite(step.floor)) svg.append(make("line", { x1: x - 4, x2: x + wide + 4, y1: up(step.floor), y2: up(step.floor), stroke: "var(--text)", "stroke-width": 2, "stroke-dasharray": "2 3" }));
     if (Number.isFinite(step.heldout)) {
       const [cx, cy] = [x + wide + 12, up(step.heldout)];
-      svg.append(make("path", { d: `M${cx} ${cy - 6}l6 6-6 6-6-6z`, fill: color("card"), stroke: color("rest"), "stroke-width": 2 }), make("text", { x: cx + 9, y: cy + 4, "font-size": 12, fill: color("rest") }, number(step.heldout)));
+      svg.append(make("path", { d: `M${cx} ${cy - 6}l6 6-6 6-6-6z`, fill: "var(--card)", stroke: "var(--rest)", "stroke-width": 2 }), make("text", { x: cx + 9, y: cy + 4, "font-size": 12, fill: "var(--rest)" }, number(step.heldout)));
     }
-    svg.append(make("text", { x: x + wide / 2, y: height - bottom + 16, "text-anchor": "middle", "font-size": 12, fill: color("text") }, step.name), make("text", { x: x + wide / 2, y: height - bottom + 32, "text-anchor": "middle", "font-size": 11, fill: color("quiet") }, step.note || ""));
+    svg.append(make("text", { x: x + wide / 2, y: height - bottom + 16, "text-anchor": "middle", "font-size": 12, fill: "var(--text)" }, step.name), make("text", { x: x + wide / 2, y: height - bottom + 32, "text-anchor": "middle", "font-size": 11, fill: "var(--quiet)" }, step.note || ""));
   });
-  svg.append(make("text", { x: 8, y: height - 6, "font-size": 12, fill: color("quiet") }, `error [${unit}]: bar fitted runs, diamond held-out runs, dotted line what noise and structure explain`));
+  svg.append(make("text", { x: 8, y: height - 6, "font-size": 12, fill: "var(--quiet)" }, `error [${unit}]: bar fitted runs, diamond held-out runs, dotted line what noise and structure explain`));
   return svg;
 }

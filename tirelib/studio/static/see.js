@@ -1,5 +1,5 @@
 // Step 2: where the model fails: a map of what is left, the chosen run, and any number over any condition.
-import { active, app, arraysOf, current, documentOf, progressOf, wish } from "./data.js";
+import { active, app, arraysOf, current, documentOf, progressOf, VERDICTS, wish } from "./data.js";
 import { choose, csvButton, fill, h, number, unitName } from "./dom.js";
 import { Heat, limitOf } from "./heat.js";
 import { Plot } from "./plots.js";
@@ -53,7 +53,7 @@ export class Field {
     const has = varying(data).map(([key, text]) => [key, text]);
     const orders = strain ? [["load", "load"], ["pressure", "pressure"], ["speed", "speed"], ["order", "time order"]] : has.filter(([k]) => ["load", "pressure", "camber", "speed"].includes(k));
     const known = data.white.some(Number.isFinite);
-    fill(this.controls, h("h2", {}, this.trace ? `What ${this.trace.name} would leave` : "What is left"), h("span", { class: "room" }),
+    fill(this.controls, h("h2", {}, this.trace ? `What ${this.trace.name} would leave [${this.unit}]` : `What is left [${this.unit}]`), h("span", { class: "room" }),
       choose(orders.length ? orders : [["load", "load"]], this.by, (by) => { this.by = by; this.build(); this.detail(); }, "rows by"),
       choose(Object.entries(VALUES).filter(([k]) => k !== "white" || known), this.value, (v) => { this.value = v; this.build(); this.detail(); }, "values"),
       choose([["diverging", "blue and red"], ["cividis", "dark to light"]], this.heat.colors, (c) => { this.heat.colors = c; this.heat.image = null; this.heat.draw(); }, "colours"),
@@ -107,7 +107,7 @@ export class See {
       h("div", { class: "figures" }, h("div", {}, h("span", { class: "quiet" }, "error of the model"), h("b", { id: "error" }, number(c.error, 4)), h("span", { class: "quiet" }, unitName(c.error_unit))),
         h("div", {}, h("span", { class: "quiet" }, "not explained, rms"), h("b", {}, number(c.residual_rms, 3)), h("span", { class: "quiet" }, `of ${number(c.measured_rms, 3)} ${unitName(c.unit)}`)),
         c.noise ? h("div", {}, h("span", { class: "quiet" }, "noise of the repeats"), h("b", {}, number(c.noise, 3)), h("span", { class: "quiet" }, unitName(c.unit))) : null,
-        h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, c.verdict.replaceAll("_", " ")), h("span", { class: "quiet" }, c.verdict === "fits" ? "the rest is noise" : ""))),
+        h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, c.verdict.replaceAll("_", " ")), h("span", { class: "quiet" }, c.verdict === "fits" ? "the rest is noise" : VERDICTS[model.verdict] || "more than noise is left"))),
       h("span", { class: "room" }), h("button", { class: "main", type: "button", onclick: () => this.go("suspect") }, "Find what is missing")),
     said.length ? h("details", {}, h("summary", {}, `Where it fails, in words (${said.length})`), h("ul", {}, said.map((s) => h("li", {}, s)))) : null);
     this.plots();
@@ -165,7 +165,7 @@ export class See {
       const order = members.slice().sort((a, b) => data[key][a] - data[key][b]);
       const [, text, u] = CONDITIONS.find(([k]) => k === key);
       plot.points = true;
-      plot.show({ title, unit: label, y: `${name} [${label}]`, x: { title: `${text} [${u}]`, values: order.map((i) => data[key][i]) }, extra: [["run", order.map((i) => data.run[i])]], series: series.map((s) => ({ ...s, points: true, values: order.map((i) => data[s.from][i]) })) });
+      plot.show({ title, unit: label, y: `${name}, ISO 8855 [${label}]`, x: { title: `${text} [${u}]`, values: order.map((i) => data[key][i]) }, extra: [["run", order.map((i) => data.run[i])]], series: series.map((s) => ({ ...s, points: true, values: order.map((i) => data[s.from][i]) })) });
     };
     draw(field.curve, field.rows[field.row].members, field.slip.key, [{ name: "measured", from: "measured", color: "measured" }, { name: "model", from: "model", color: "model", hollow: true }], "measured (filled) and model (hollow) at these conditions", unit);
     draw(field.rest, [...data.run.keys()], this.x, [{ name: VALUES[this.y] || this.y, from: this.y, color: "rest" }], "all points", this.y === "white" ? "noise" : unit);

@@ -1,7 +1,7 @@
 // The frame: steps, campaign, quantity, jobs; the view of the step that the address names.
 import { active, app, connect, current, listen, nameOf, progressOf, refresh, wish } from "./data.js";
 import { h, fill, toast } from "./dom.js";
-import { Open } from "./open.js";
+import { entries, Open, receive } from "./open.js";
 import { See } from "./see.js";
 import { Suspect } from "./suspect.js";
 import { Add } from "./add.js";
@@ -58,7 +58,7 @@ function jobs() {
   for (const box of place.children) {
     const at = progressOf(Number(box.dataset.job)), bar = box.querySelector("progress");
     if (at?.total) { bar.max = at.total; bar.value = Math.min(at.done, at.total); } else bar.removeAttribute("value");
-    box.querySelector("[data-label]").textContent = at ? at.label || `step ${at.done}` : "waits";
+    box.querySelector("[data-label]").textContent = at ? at.label || (at.done ? `step ${at.done}` : "begins") : "waits";
   }
 }
 
@@ -70,8 +70,28 @@ const theme = (name) => {
   document.documentElement.dataset.theme = name;
   document.getElementById("theme").textContent = name === "dark" ? "Light" : "Dark";
 };
-theme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
-document.getElementById("theme").addEventListener("click", () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
+theme(localStorage.getItem("theme") || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
+document.getElementById("theme").addEventListener("click", () => {
+  const name = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
+  localStorage.setItem("theme", name);
+  theme(name);
+});
+
+// Files may be dropped anywhere: the browser would leave the page otherwise.
+const over = (yes) => document.body.classList.toggle("over", yes);
+const onDrag = (kind, what) => document.addEventListener(kind, (event) => {
+  if (!event.dataTransfer.types.includes("Files")) return;
+  event.preventDefault();
+  what(event);
+});
+for (const kind of ["dragenter", "dragover"]) onDrag(kind, () => over(true));
+onDrag("dragleave", (event) => over(Boolean(event.relatedTarget)));
+onDrag("drop", async (event) => {
+  over(false);
+  const files = await entries(event.dataTransfer);
+  if (step !== "open") go("open");
+  receive(files, go);
+});
 
 let first = true;
 const told = new Set();

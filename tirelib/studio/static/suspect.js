@@ -1,6 +1,7 @@
 // Step 3: which effect is missing: the verdict in four lines, the effects by part, the trace of each.
-import { app, arraysOf, current, documentOf, wish } from "./data.js";
-import { dialog, fill, h, number, strength, toast, unitName } from "./dom.js";
+import { app, arraysOf, current, documentOf, VERDICTS, wish } from "./data.js";
+import { fill, h, number, strength, toast, unitName } from "./dom.js";
+import { effectPage } from "./effect.js";
 import { Plot } from "./plots.js";
 import { Field, wait } from "./see.js";
 import { CONDITIONS, isStrain, sliced, unitOf } from "./maps.js";
@@ -27,7 +28,7 @@ export class Suspect {
     const model = current();
     const told = model && (await documentOf(model, "diagnosis").catch(() => null));
     if (!told || !(await this.field.load(model).catch(() => false))) { this.body.hidden = true; this.key = ""; wait(this.head, ["check", "identify", "compare", "diagnose"]); return; }
-    const key = JSON.stringify([app.campaign.campaign, model.number, app.campaign.quantity, model.documents, app.home.effects.length]);
+    const key = JSON.stringify([app.campaign.campaign, model.number, app.campaign.quantity, Object.entries(model.documents).filter(([file]) => !file.endsWith("planted.npz")), app.home.effects.length]);
     if (key === this.key) return;
     this.key = key; this.body.hidden = false; this.told = told; this.model = model; this.hovered = "";
     this.traces = await arraysOf(model, "traces").catch(() => null);
@@ -41,7 +42,7 @@ export class Suspect {
   say() {
     const { told, model } = this;
     const apart = told.verdict === "indistinguishable" || told.candidates.some((e) => e.twins.length && told.named.includes(e.effect)) || (told.sets || []).length > 1;
-    fill(this.head, h("div", { class: "row" }, h("h2", {}, "The verdict"), h("span", { class: "tag alarm", id: "verdict" }, told.verdict.replaceAll("_", " ")),
+    fill(this.head, h("div", { class: "row" }, h("h2", {}, "The verdict"), h("span", { class: "tag alarm", id: "verdict" }, VERDICTS[told.verdict] || told.verdict),
       told.false_alarm !== undefined && told.false_alarm !== null ? h("span", { class: "quiet small" }, `chance of a false alarm: ${number(100 * told.false_alarm, 2)} %`) : null, h("span", { class: "room" }),
       told.named.length && told.verdict !== "indistinguishable" ? h("button", { type: "button", id: "tick-named", onclick: () => { for (const box of this.list.querySelectorAll("input[data-effect]")) if (told.named.includes(box.dataset.effect) && !box.checked) box.click(); this.button.focus(); } }, told.named.length > 1 && told.verdict !== "indistinguishable" ? "Tick what is named" : "Tick it") : null,
       h("button", { type: "button", onclick: () => wish({ do: "next-test", ...this.where() }).then(() => toast("The next run is being looked for.")) }, apart ? "What would tell them apart?" : "Which run to measure next?")),
@@ -88,7 +89,7 @@ export class Suspect {
     const on = () => this.hover(e.effect);
     return h("tr", { "data-rank": e.rank, "data-name": e.effect, onmouseenter: on, onfocusin: on },
       h("td", {}, box),
-      h("td", {}, h("button", { class: "small", type: "button", title: "What it is, its source, what it would look like here", onclick: () => this.page(e.effect, e) }, e.effect), " ", told.named.includes(e.effect) ? h("span", { class: "tag alarm" }, "named") : e.level !== "quiet" ? h("span", { class: "tag" }, e.level) : null,
+      h("td", {}, h("button", { class: "small", type: "button", title: "What it is, its source, what it would look like here", onclick: () => effectPage(e.effect, e, this) }, e.effect), " ", told.named.includes(e.effect) ? h("span", { class: "tag alarm" }, "named") : e.level !== "quiet" ? h("span", { class: "tag" }, e.level) : null,
         h("div", { class: "small quiet" }, this.title(e.effect)?.title || e.title || "", e.twins.length ? ` Looks like ${e.twins.map((t) => `${t.effect} (${number(t.angle_deg, 2)} deg apart)`).join(", ")}.` : "", sets.length ? ` In set ${sets.join(", ")}.` : "")),
       h("td", { class: "n" }, e.p !== undefined && e.p !== null ? [number(e.p, 2), e.p_std ? h("div", { class: "small quiet" }, `± ${number(e.p_std, 1)}`) : null] : number(e.score / e.threshold, 3)),
       h("td", {}, `${strength(e.strength)} ± ${strength(e.std, 2)} ${e.unit === "1" ? "" : e.unit}`, e.in_range ? null : h("div", { class: "small warn" }, `outside the plausible ${(e.range || []).map((x) => number(x)).join(" to ")}`)),
@@ -97,12 +98,13 @@ export class Suspect {
   }
 
   owned(e) {
-    return h("tr", { "data-rank": 0 }, h("td", {}, "✓"), h("td", {}, `${e.effect} `, h("span", { class: "tag" }, "in the model"), h("div", { class: "small quiet" }, this.title(e.effect)?.title || "")), h("td", {}), h("td", {}, strength(e.strength)), h("td", {}),
-      h("td", {}, h("button", { class: "small", type: "button", onclick: () => this.remove(e.effect) }, "Remove")));
+    const box = h("input", { type: "checkbox", checked: true, "aria-label": `untick ${e.effect}`, "data-owned": e.effect, onchange: async () => { if (!(await this.remove(e.effect))) box.checked = true; } });
+    return h("tr", { "data-rank": 0 }, h("td", {}, box), h("td", {}, `${e.effect} `, h("span", { class: "tag" }, "in the model"), h("div", { class: "small quiet" }, this.title(e.effect)?.title || "")), h("td", {}), h("td", {}, strength(e.strength)),
+      h("td", { colspan: 2, class: "small quiet" }, "untick to take it out and fit again"));
   }
 
   dead(name, why) {
-    return h("tr", { class: "dead", "data-rank": 900 }, h("td", {}, "–"), h("td", {}, h("button", { class: "small", type: "button", onclick: () => this.page(name, null) }, name), h("div", { class: "small" }, this.title(name)?.title || "")), h("td", { colspan: 4, class: "small" }, `This plan cannot show it: ${why || "it changes nothing here"}`));
+    return h("tr", { class: "dead", "data-rank": 900 }, h("td", {}, "–"), h("td", {}, h("button", { class: "small", type: "button", onclick: () => effectPage(name, null, this) }, name), h("div", { class: "small" }, this.title(name)?.title || "")), h("td", { colspan: 4, class: "small" }, `This plan cannot show it: ${why || "it changes nothing here"}`));
   }
 
   count() { this.button.textContent = this.ticked.size ? `Add ${[...this.ticked].join(", ")}` : "Add what is ticked"; this.button.disabled = !this.ticked.size; }
@@ -112,7 +114,11 @@ export class Suspect {
     if (done) { this.ticked.clear(); this.go("add"); }
   }
 
-  async remove(effect) { if (await wish({ do: "remove", ...this.where(), effect })) this.go("add"); }
+  async remove(effect) {
+    const done = await wish({ do: "remove", ...this.where(), effect });
+    if (done) this.go("add");
+    return done;
+  }
 
   hover(name) {
     if (name === this.hovered) return;
@@ -144,45 +150,6 @@ export class Suspect {
       clearTimeout(this.later);
       this.later = setTimeout(() => this.field.overlay(trace ? { name, values: trace } : null), 60);
     }
-  }
-
-  page(name, e) {
-    const about = this.title(name);
-    if (!about) return;
-    const unit = about.unit === "1" ? "" : ` ${about.unit}`;
-    const plot = new Plot(`planted-${name}`, { height: 230 }), said = h("p", { class: "small quiet", role: "status" });
-    const middle = e ? e.strength : about.components > 1 ? new Array(about.components).fill(0).map((_, k) => (k ? 0 : about.range[1] / 2)) : (Math.abs(about.range[1]) >= Math.abs(about.range[0]) ? about.range[1] : about.range[0]) / 2;
-    const input = h("input", { value: [].concat(middle).map((x) => Number(x.toPrecision(4))).join(", "), size: 16, "aria-label": "strength" });
-    const show = async () => {
-      const numbers = input.value.split(",").map(Number);
-      if (numbers.some((x) => !Number.isFinite(x)) || numbers.length !== about.components) { said.textContent = `${about.components} number(s) are needed.`; return; }
-      const before = this.model.documents[`${app.campaign.quantity}/planted.npz`];
-      said.textContent = "The effect is being planted.";
-      await wish({ do: "plant", ...this.where(), effect: name, strength: numbers });
-      const look = setInterval(async () => {
-        const model = current(), stamp = model?.documents[`${app.campaign.quantity}/planted.npz`];
-        const failed = app.campaign.jobs.filter((job) => job.kind === "plant").at(-1);
-        if (failed?.state === "failed") { clearInterval(look); said.textContent = failed.message; return; }
-        if (!stamp || stamp === before) return;
-        clearInterval(look);
-        const planted = await arraysOf(model, "planted"), { data } = this.field;
-        const trace = planted[`trace_${name}`];
-        if (!trace) { said.textContent = planted.texts[`fault_${name}`] || "There is no trace."; return; }
-        said.textContent = `What ${name} of strength ${input.value}${unit} would leave in each run, and the residual of the chosen run.`;
-        if (isStrain(data)) {
-          const n = data.angle.length, row = this.field.rows[this.field.row];
-          plot.show({ title: row.label, unit: "microstrain", x: { title: "wheel angle [deg]", values: Array.from(data.angle) }, series: [{ name: "residual", values: sliced(data, "difference", row.index), color: "rest" }, { name: name, values: trace.subarray(row.index * n, (row.index + 1) * n), color: "trace", dash: [6, 4] }] });
-        } else {
-          const order = [...data.run.keys()].sort((a, b) => data[this.field.slip.key][a] - data[this.field.slip.key][b]);
-          plot.show({ title: "all points", unit: unitOf(data), x: { title: this.field.slip.title, values: order.map((i) => data[this.field.slip.key][i]) }, series: [{ name: "residual", values: order.map((i) => data.difference[i]), color: "rest", points: true }, { name, values: order.map((i) => trace[i]), color: "trace", points: true, hollow: true }] });
-        }
-      }, 150);
-    };
-    dialog(name, h("p", {}, about.title), h("p", { class: "small" }, `Acts on: ${about.stage}. Varies with: ${about.varies_with.join(", ") || "nothing"}. Plausible strength: ${about.range.map((x) => number(x)).join(" to ")}${unit}.`),
-      h("h3", {}, "Equation"), h("p", {}, about.equation || "The law itself says it:"), h("details", {}, h("summary", {}, "The law as it is computed"), h("pre", {}, about.law)),
-      h("h3", {}, "Source"), h("p", {}, about.source), h("h3", {}, "What it would look like here"),
-      h("div", { class: "row" }, h("label", {}, "strength ", input, unit), h("button", { type: "button", onclick: show }, "Plant it")), said, plot.element);
-    document.getElementById("dialog").addEventListener("close", () => plot.remove(), { once: true });
   }
 }
 
