@@ -29,33 +29,12 @@ TICK = 0.05
 LONGEST_WISH = 1 << 18
 """Bytes of a wish; a map of a file with many columns is the longest."""
 MOST_VIEWERS = 32
-STATIC = {
-    "/": "index.html",
-    **{
-        f"/{name}": name
-        for name in (
-            *(
-                "studio.css",
-                "icon.svg",
-                "studio.js",
-                "data.js",
-                "dom.js",
-                "plots.js",
-                "heat.js",
-                "maps.js",
-            ),
-            *(
-                "open.js",
-                "import.js",
-                "see.js",
-                "suspect.js",
-                "effect.js",
-                "add.js",
-                "compare.js",
-                "take.js",
-            ),
-        )
-    },
+SCRIPTS = (
+    *("studio", "data", "dom", "plots", "heat", "maps"),
+    *("open", "import", "see", "suspect", "effect", "add", "compare", "take"),
+)
+STATIC = {"/": "index.html", "/studio.css": "studio.css", "/icon.svg": "icon.svg"} | {
+    f"/{name}.js": f"{name}.js" for name in SCRIPTS
 }
 """Every address of a file, and its name."""
 JSON_DOCUMENTS = ("comparison", "diagnosis", "next-test")
