@@ -74,7 +74,9 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
     found = []
     for law in GRID:
         allowed = {BASE: fit.widths**2, **law_errors(fit, law)}
-        found.append(max(Null(views, family, allowed).likelihood for family in others))
+        found.append(
+            max(Null(view, family, allowed).likelihood for family in others for view in views)
+        )
     return np.array(found)
 
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.infer.hypothesis import Hypothesis, plain_tires, products
-from tirelib.infer.null import Products
 from tirelib.infer.problem import Problem
 
 
@@ -66,13 +65,12 @@ class Plans:
         self.problem, self.base = problem, base
         self.alpha = alpha
         self.effects = tuple(effect.name for effect in problem.living)
-        view, _ = base.null.likeliest
         families = [null.family for null in base.nulls]
         random = np.random.default_rng(seed)
         self.tires = []
         for number, family in enumerate(families):
             count = len(range(number, repeats, len(families)))
-            every = plain_tires(problem, base.fit, family, {}, view.own)
+            every = plain_tires(problem, base.fit, family, {}, base.null.view.own)
             chosen = random.permutation(len(family))[:count]
             self.tires.append((family, every[chosen]))
 
@@ -93,9 +91,9 @@ class Plans:
         return self._judged([tires + rows for _, tires in self.tires])
 
     def _judged(self, waves: Sequence[FloatArray]) -> Judged:
-        turned = products(self.problem, self.base.null.views, np.concatenate(waves))
+        turned = products(self.problem, self.base.null.view, np.concatenate(waves))
         rejected = self.base.p_values(turned) <= self.alpha
-        out = _columns(turned, np.flatnonzero(rejected))
+        out = turned[0][:, rejected], turned[1][rejected]
         members = np.zeros((len(self.effects), rejected.size), dtype=bool)
         for inside, name in zip(members, self.effects, strict=True):
             inside[rejected] = self.base.p_values(out, name) > self.alpha
@@ -122,7 +120,3 @@ class Plans:
         both = np.stack([fit.rows[name][0].ravel(), fit.rest.ravel()])
         own = both - np.linalg.lstsq(base.T, both.T, rcond=None)[0].T @ base
         return float(np.sum(own[0] ** 2) / np.sum(own[1] ** 2))
-
-
-def _columns(turned: Products, chosen: np.ndarray) -> Products:
-    return [(right[:, chosen], square[chosen]) for right, square in turned]

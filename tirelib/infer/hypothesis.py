@@ -151,19 +151,17 @@ def judged(
     return Hypothesis(fit, *kept, looseness, plausible(fit, own_effects), likelihood)
 
 
-def _null(views: Sequence[View], fit: Posterior, family: Family, law: float) -> Null:
+def _null(view: View, fit: Posterior, family: Family, law: float) -> Null:
     wide = fit.widths**2
     wide[len(fit.point.base) :] *= PRIOR**2
-    return Null(views, family, {BASE: wide, **law_errors(fit, law)})
+    return Null(view, family, {BASE: wide, **law_errors(fit, law)})
 
 
 def _likelihoods(
     views: Sequence[View], fit: Posterior, families: Sequence[Family], law: float
 ) -> list[float]:
     """Return the largest likelihood over the families for each size of a run's own misfit."""
-    return [
-        max(_null([view], fit, family, law).likelihood for family in families) for view in views
-    ]
+    return [max(_null(view, fit, family, law).likelihood for family in families) for view in views]
 
 
 def _tested(
@@ -178,7 +176,7 @@ def _tested(
 
     `best` is the likeliest size of a run's own misfit.
     """
-    at = [views[best]]
+    at = views[best]
     nulls = tuple(_null(at, fit, family, law) for family in families)
     plain = []
     for family in families:
@@ -237,13 +235,10 @@ def plain_tires(
     return np.asarray(tires + np.tensordot(planted, rows, axes=1))
 
 
-def products(problem: Problem, views: Sequence[View], tires: FloatArray) -> Products:
-    """Return the products of residuals (k, ...) with the rows of every view."""
-    out = []
-    for view in views:
-        white = problem.whitener(view.own)(tires)
-        out.append((view.white @ white.T, np.sum(white**2, axis=1)))
-    return out
+def products(problem: Problem, view: View, tires: FloatArray) -> Products:
+    """Return the products of residuals (k, ...) with the rows of a view."""
+    white = problem.whitener(view.own)(tires)
+    return view.white @ white.T, np.sum(white**2, axis=1)
 
 
 def law_errors(fit: Posterior, law: float) -> dict[str, float | FloatArray]:

@@ -132,8 +132,7 @@ class _Forecast:
 
     def drawn(self, count: int, seed: int) -> FloatArray:
         """Return measurements if this rival is true, without noise, shape (count, ...)."""
-        _, weighed = self.rival.null.likeliest
-        draws = weighed.draws(np.random.default_rng(seed), count)
+        draws = self.rival.null.likeliest.draws(np.random.default_rng(seed), count)
         return np.asarray(self.start + np.tensordot(draws, self.rows, axes=1))
 
     def tested(
@@ -145,8 +144,7 @@ class _Forecast:
         standard deviation of the rise of the likelihood ratio.
         """
         rival, null = self.rival, self.rival.null
-        view, _ = null.likeliest
-        whiten, limit = self.ahead.whitener(view.own), rival.limit(alpha)
+        whiten, limit = self.ahead.whitener(null.view.own), rival.limit(alpha)
         white = whiten(self.rows)
         left = whiten(true.drawn(DRAWS, seed) - self.start)
         further = [
@@ -154,8 +152,8 @@ class _Forecast:
             for name in true.rival.names
             if name not in rival.names and name in null.names
         ]
-        now = view.normal.right[:, None], np.array([view.normal.square])
-        before = null.ratios_of([now], only=view)[further, 0]
+        now = null.measured
+        before = null.ratios_of(now)[further, 0]
         count = null.counts[further, None]
         runs = int(self.ahead.run_ahead.max()) + 1
         chance, rise, std = np.zeros(runs), np.zeros(runs), np.zeros(runs)
@@ -164,18 +162,17 @@ class _Forecast:
             rows, rest = white[:, here], left[:, here]
             # the same draws at every run, so that runs compare
             rest = rest + np.random.default_rng([seed, 1]).standard_normal(rest.shape)
-            tested = _with(null, view, rows)
-            products = [(now[0] + rows @ rest.T, now[1] + np.sum(rest**2, axis=1))]
-            ratios = tested.ratios_of(products)
+            tested = _with(null, rows)
+            ratios = tested.ratios_of((now[0] + rows @ rest.T, now[1] + np.sum(rest**2, axis=1)))
             chance[run] = np.mean(tested.standard(ratios).max(axis=0) > limit)
             gained = np.max(count * (ratios[further] - before[:, None]), axis=0, initial=0.0)
             rise[run], std[run] = gained.mean(), gained.std()
         return chance, rise, std
 
 
-def _with(null: Null, view: View, rows: FloatArray) -> Null:
-    """Return a test with further whitened rows (m, n) behind those of a view."""
-    normal = view.normal
+def _with(null: Null, rows: FloatArray) -> Null:
+    """Return a test with further whitened rows (m, n) behind those of its runs."""
+    view, normal = null.view, null.view.normal
     more = Normal(
         normal.blocks,
         normal.gram + rows @ rows.T,
@@ -183,4 +180,4 @@ def _with(null: Null, view: View, rows: FloatArray) -> Null:
         normal.square,
         normal.count + rows.shape[1],
     )
-    return null.about([View(view.own, more, view.log_volume, np.zeros(0))])
+    return null.about(View(view.own, more, view.log_volume, np.zeros(0)))

@@ -44,8 +44,8 @@ chooses."""
 FREE = ", free belt"
 """End of the name of shapes that stand away from the contact."""
 
-Products = Sequence[tuple[FloatArray, FloatArray]]
-"""B r, (m, k), and r' r, (k,), of k residuals r for every view."""
+Products = tuple[FloatArray, FloatArray]
+"""B r, (m, k), and r' r, (k,), of k residuals r."""
 
 
 class Size(NamedTuple):
@@ -71,8 +71,8 @@ class Null:
 
     Parameters
     ----------
-    views : sequence of View
-        Normal equations about the fit at several sizes of a run's own misfit.
+    view : View
+        Normal equations about the fit.
     family : Family
     allowed : mapping of block to variance
         What the hypothesis leaves open beside what plain tires show.
@@ -87,29 +87,27 @@ class Null:
 
     def __init__(
         self,
-        views: Sequence[View],
+        view: View,
         family: Family,
         allowed: Mapping[str, float | FloatArray],
     ) -> None:
-        blocks = views[0].normal.blocks
-        self.views, self.family, self.allowed = views, family, allowed
+        blocks = view.normal.blocks
+        self.view, self.family, self.allowed = view, family, allowed
         self.names = [name for name in blocks if name != BASE]
         self.blocks = [blocks[name] for name in self.names]
         self.counts = np.array([block.stop - block.start for block in self.blocks], dtype=float)
         typical = family.spread()
         self._weighed = []
-        for view in views:
-            for size in _sizes(family.largest, typical):
-                variance = {name: size.of(name) ** 2 * each for name, each in typical.items()}
-                spread = view.normal.spread({**variance, **allowed})
-                self._weighed.append((view, size, Weighed(view.normal, spread)))
+        for size in _sizes(family.largest, typical):
+            variance = {name: size.of(name) ** 2 * each for name, each in typical.items()}
+            spread = view.normal.spread({**variance, **allowed})
+            self._weighed.append((size, Weighed(view.normal, spread)))
 
     @cached_property
     def _levels(self) -> FloatArray:
         """The log likelihood at every size, [nats]."""
-        return np.array(
-            [w.log_likelihood() + v.log_volume + k.log_prior for v, k, w in self._weighed]
-        )
+        each = [w.log_likelihood() + size.log_prior for size, w in self._weighed]
+        return self.view.log_volume + np.array(each)
 
     @property
     def likelihood(self) -> float:
@@ -117,28 +115,22 @@ class Null:
         return float(self._levels.max())
 
     @property
-    def likeliest(self) -> tuple[View, Weighed]:
+    def likeliest(self) -> Weighed:
         """The normal equations at the likeliest sizes."""
-        view, _, weighed = self._weighed[int(np.argmax(self._levels))]
-        return view, weighed
+        return self._weighed[int(np.argmax(self._levels))][1]
 
-    def ratios_of(
-        self, products: Products, *, given: int | None = None, only: View | None = None
-    ) -> FloatArray:
+    def ratios_of(self, products: Products, *, given: int | None = None) -> FloatArray:
         """Return L_j / n_j of k residuals, (n_names, k).
 
         Parameters
         ----------
-        products : sequence of (shape (m, k), shape (k,))
-            One for each view, or that of `only`.
+        products : (shape (m, k), shape (k,))
         given : int, optional
             Place of a further effect that the hypothesis counts with.
-        only : View, optional
-            The only size of a run's own misfit.
         """
         plain, free = [], []
-        for level, weighed, right in self._at(products, only):
-            gram, here = weighed.gram, weighed.right(right)
+        for level, weighed in self._at(products):
+            gram, here = weighed.gram, weighed.right(products[0])
             if given is not None:
                 block, more = self.blocks[given], self._more(given, weighed)
                 level = level + taken(gram, here, block, more)
@@ -155,19 +147,14 @@ class Null:
 
     def likelihood_of(self, products: Products) -> FloatArray:
         """Return the largest log likelihood of k residuals over the sizes, (k,), [nats]."""
-        return np.asarray(np.max([level for level, _, _ in self._at(products)], axis=0))
+        return np.asarray(np.max([level for level, _ in self._at(products)], axis=0))
 
-    def _at(
-        self, products: Products, only: View | None = None
-    ) -> Iterator[tuple[FloatArray, Weighed, FloatArray]]:
-        """Yield the log likelihood (k,) at every size, with the metric and the products B r."""
-        views = self.views if only is None else [only]
-        of_view = {id(view): each for view, each in zip(views, products, strict=True)}
-        for view, size, weighed in self._weighed:
-            if id(view) in of_view:
-                right, square = of_view[id(view)]
-                level = weighed.gain(right) - 0.5 * square + view.log_volume + size.log_prior
-                yield level, weighed, right
+    def _at(self, products: Products) -> Iterator[tuple[FloatArray, Weighed]]:
+        """Yield the log likelihood (k,) at every size, with the metric."""
+        right, square = products
+        for size, weighed in self._weighed:
+            rest = self.view.log_volume - 0.5 * square + size.log_prior
+            yield weighed.gain(right) + rest, weighed
 
     def _more(self, j: int, weighed: Weighed) -> FloatArray:
         """Return the variance of a block beyond that of plain tires."""
@@ -179,13 +166,13 @@ class Null:
     @property
     def size(self) -> "Size":
         """The likeliest size of what this tire shows over what its family shows."""
-        return self._weighed[int(np.argmax(self._levels))][1]
+        return self._weighed[int(np.argmax(self._levels))][0]
 
-    def about(self, views: Sequence[View], size: "Size | None" = None) -> "Null":
+    def about(self, view: View, size: "Size | None" = None) -> "Null":
         """Return the same test of other normal equations, at one size of what the tire shows."""
-        other = Null(views, self.family, self.allowed)
+        other = Null(view, self.family, self.allowed)
         if size is not None:
-            other._weighed = [each for each in other._weighed if each[1] == size]
+            other._weighed = [each for each in other._weighed if each[0] == size]
         return other
 
     def scores_of(self, products: Products, given: str = "") -> FloatArray:
@@ -217,7 +204,8 @@ class Null:
     @property
     def measured(self) -> Products:
         """Products of the user's residual."""
-        return [(v.normal.right[:, None], np.array([v.normal.square])) for v in self.views]
+        normal = self.view.normal
+        return normal.right[:, None], np.array([normal.square])
 
     def left(self, names: Sequence[str]) -> dict[str, float]:
         """Return the largest standard score of anything else, with each further effect fitted."""
@@ -225,26 +213,23 @@ class Null:
 
     def explained(self) -> FloatArray:
         """Return coefficients of all rows by the hypothesis and what plain tires show, (m,)."""
-        view, weighed = self.likeliest
-        return weighed.mean(view.normal.right)
+        return self.likeliest.mean(self.view.normal.right)
 
     def beside(self, name: str) -> tuple[FloatArray, FloatArray]:
         """Return what a further effect or more of a group takes, and its covariance.
 
         Shapes (n,) and (n, n): coefficients of the rows of that name, beyond what plain tires show.
         """
-        view, weighed = self.likeliest
-        j = self.names.index(name)
+        weighed, j = self.likeliest, self.names.index(name)
         block = self.blocks[j]
         inner = weighed.gram[block, block] + np.diag(1.0 / self._more(j, weighed))
         covariance = np.asarray(np.linalg.inv(inner), dtype=float)
-        return covariance @ weighed.right(view.normal.right)[block], covariance
+        return covariance @ weighed.right(self.view.normal.right)[block], covariance
 
     def angle(self, one: str, other: str) -> float:
         """Return the smallest angle between two effects' signatures as this test weighs them."""
-        _, weighed = self.likeliest
         a, b = (self.blocks[self.names.index(name)] for name in (one, other))
-        gram = weighed.gram
+        gram = self.likeliest.gram
         left, right = (np.linalg.cholesky(gram[k, k]) for k in (a, b))
         inner = np.linalg.solve(left, np.linalg.solve(right, gram[b, a]).T)
         return float(np.arccos(min(float(np.linalg.norm(inner, 2)), 1.0)))

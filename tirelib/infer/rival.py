@@ -27,7 +27,7 @@ def p_against(problem: Problem, hypothesis: Hypothesis, rival: Hypothesis) -> fl
     ratio = max(rival.likelihood - hypothesis.likelihood, 0.0)
     fit = hypothesis.fit
     modelled = fit.rest - np.tensordot(_coordinates(fit), fit.rows[BASE], axes=1)
-    laws, own = law_errors(fit, hypothesis.law), hypothesis.null.likeliest[0].own
+    laws, own = law_errors(fit, hypothesis.law), hypothesis.null.view.own
     p = [float(np.exp(-ratio))]
     for family in (null.family for null in hypothesis.nulls):
         # what is measured where the hypothesis is true, less what is measured
@@ -44,7 +44,7 @@ def _likelihood(
 ) -> FloatArray:
     """Return the log likelihood by the families but one of the runs moved by waveforms, (k,)."""
     others = [null for null in hypothesis.nulls if null.family is not family]
-    turned = products(problem, hypothesis.null.views, hypothesis.fit.rest + moved)
+    turned = products(problem, hypothesis.null.view, hypothesis.fit.rest + moved)
     return np.asarray(np.max([null.likelihood_of(turned) for null in others], axis=0))
 
 

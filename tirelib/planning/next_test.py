@@ -220,14 +220,13 @@ def gains(
     nothing = hypotheses.at([effect.name for effect, _ in suspects.beside])
     if not suspects.with_nothing or nothing is None:
         return {}
-    view, _ = nothing.null.likeliest
     limit = nothing.limit(hypotheses.false_alarm)
     out: dict[str, dict[float, float]] = {
         rival.name: {} for rival in test.trial.rivals if rival.name != NOTHING
     }
     for times in (*PLAN_REPEATS, ENDLESS):
-        again = nothing.fit.view(problem.repeated(min(times, MANY)), view.own)
-        null = nothing.null.about([again], nothing.null.size)
+        again = nothing.fit.view(problem.repeated(min(times, MANY)), nothing.null.view.own)
+        null = nothing.null.about(again, nothing.null.size)
         for rival in test.trial.rivals:
             if rival.name != NOTHING:
                 effect = hypotheses.effects[rival.name]
