@@ -92,7 +92,7 @@ def main() -> None:
         }
         families = [family_of(name, list(of.values())) for name, of in fits.items()]
         for family in families:
-            shown = {k: round(float(np.sqrt(v)), 3) for k, v in family.spread().items()}
+            shown = {k: round(float(np.sqrt(v)), 3) for k, v in family.shown().items()}
             say(f"{quantity} {family.name} {len(family)}, own {family.own:g}: {json.dumps(shown)}")
         provenance = {
             "made by": "build/force_tires/learn.py",

@@ -42,7 +42,7 @@ def fingerprint() -> str:
         "random_effects",
     )
     files = [root / "identify" / f"{name}.py" for name in names]
-    files += [root / "model" / f"{name}.py" for name in ("base", "chain", "state", "whole")]
+    files += [root / "model" / f"{name}.py" for name in ("base", "chain", "solution", "state")]
     files += [root / "model" / "rolled.py", *sorted((root / "rolling").glob("*.py"))]
     return _hash(*files, Path(__file__), *_LABORATORY)
 
@@ -142,6 +142,7 @@ def definition(tire: RigTire, pressure: float) -> dict[str, float]:
         "contact_crown": 0.0,
         "creep": 0.0,
         "tread_spread": 0.0,
+        "centrifugal_tension": 1.0,
         "tread_shear_stiffness": tire.tread_shear_x * tire.belt_width * (tire.friction > 0.0),
         "tread_hardening": tire.tread_hardening,
     }

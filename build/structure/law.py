@@ -75,7 +75,11 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
     for law in GRID:
         allowed = {BASE: fit.widths**2, **law_errors(fit, law)}
         found.append(
-            max(Null(view, family, allowed).likelihood for family in others for view in views)
+            max(
+                Null(view, family, family.spread(fit.sizes), allowed).likelihood
+                for family in others
+                for view in views
+            )
         )
     return np.array(found)
 

@@ -30,21 +30,14 @@ from tirelib.threads import one_thread
 LEVEL = 0.05
 LARGEST = 1.3
 """Error ratio of the campaigns with something hidden, at most: larger ones are seen by all."""
-NUMBERS = ("PRIOR", "MORE", "SIZES", "SIZE_STD", "OWN", "FLOOR effect", "FLOOR shape")
+NUMBERS = ("PRIOR", "MORE", "SIZES", "SIZE_STD", "OWN", "EVEN")
 
 
 @contextmanager
 def scaled(name: str, factor: float) -> Iterator[None]:
     """Change a number of `tirelib.infer` for a while, wherever it has been imported."""
-    if name.startswith("FLOOR"):
-        kind = name.split()[1]
-        before = plain.FLOOR[kind]
-        plain.FLOOR[kind] = factor * before
-        yield
-        plain.FLOOR[kind] = before
-        return
-    places = [module for module in (null, hypothesis) if hasattr(module, name)]
-    old = getattr(null, name)
+    places = [module for module in (null, hypothesis, plain) if hasattr(module, name)]
+    old = getattr(places[0], name)
     new: Any = tuple(factor * np.array(old)) if isinstance(old, tuple) else factor * old
     for module in places:
         setattr(module, name, new)

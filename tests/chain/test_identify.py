@@ -96,6 +96,7 @@ def true() -> dict[str, float]:
         "contact_crown": 0.0,
         "creep": 0.0,
         "tread_spread": 0.0,
+        "centrifugal_tension": 1.0,
     }
 
 

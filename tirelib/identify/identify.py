@@ -52,6 +52,11 @@ _PLAIN: Mapping[str, tuple[float, float, str]] = {
         1.3,
         "0 of a tread that stands like a brush, about .4 of finite-element treads",
     ),
+    "centrifugal_tension": (
+        1.0,
+        0.01,
+        "1 of a belt alone; a third of the sidewalls' mass moves with it, about a half pulls",
+    ),
     "creep": (0.004, 1.3, "assumed: rubber's friction grows up to .01 to 1 m/s of sliding, Grosch"),
 }
 """Value, relative standard deviation and source of what no campaign header holds."""

@@ -32,6 +32,7 @@ STRUCTURE_STD: Mapping[str, float] = MappingProxyType(
         "contact_crown": 1.3,
         "creep": 1.3,
         "tread_spread": 1.3,
+        "centrifugal_tension": 0.01,
     }
 )
 """Relative standard deviation by parameter, in units of the value (slopes: of a typical slope)."""

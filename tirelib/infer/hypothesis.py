@@ -20,8 +20,8 @@ from tirelib.infer.plain import BASE, ROUGHLY, Family, View
 from tirelib.infer.posterior import Posterior
 from tirelib.infer.problem import Problem
 
-LAWS = (0.075, 0.15)
-"""Relative standard deviations by which laws are off: a hypothesis stays if it does with either."""
+LAWS = (0.075, 0.15, 0.3)
+"""Relative standard deviations by which laws are off: a hypothesis stays if it does with any."""
 LOOSEST = 1.0
 """That which is tried where a hypothesis is rejected: its laws are off by as much as themselves."""
 SLACK = 2.0
@@ -154,7 +154,7 @@ def judged(
 def _null(view: View, fit: Posterior, family: Family, law: float) -> Null:
     wide = fit.widths**2
     wide[len(fit.point.base) :] *= PRIOR**2
-    return Null(view, family, {BASE: wide, **law_errors(fit, law)})
+    return Null(view, family, family.spread(fit.sizes), {BASE: wide, **law_errors(fit, law)})
 
 
 def _likelihoods(

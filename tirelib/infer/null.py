@@ -74,8 +74,10 @@ class Null:
     view : View
         Normal equations about the fit.
     family : Family
+    shown : mapping of block to variance
+        What its tires show in the plan (`Family.spread`).
     allowed : mapping of block to variance
-        What the hypothesis leaves open beside what plain tires show.
+        What the hypothesis leaves open beside that.
 
     Attributes
     ----------
@@ -89,17 +91,17 @@ class Null:
         self,
         view: View,
         family: Family,
+        shown: Mapping[str, float],
         allowed: Mapping[str, float | FloatArray],
     ) -> None:
         blocks = view.normal.blocks
-        self.view, self.family, self.allowed = view, family, allowed
+        self.view, self.family, self.shown, self.allowed = view, family, shown, allowed
         self.names = [name for name in blocks if name != BASE]
         self.blocks = [blocks[name] for name in self.names]
         self.counts = np.array([block.stop - block.start for block in self.blocks], dtype=float)
-        typical = family.spread()
         self._weighed = []
-        for size in _sizes(family.largest, typical):
-            variance = {name: size.of(name) ** 2 * each for name, each in typical.items()}
+        for size in _sizes(family.largest, shown):
+            variance = {name: size.of(name) ** 2 * each for name, each in shown.items()}
             spread = view.normal.spread({**variance, **allowed})
             self._weighed.append((size, Weighed(view.normal, spread)))
 
@@ -170,7 +172,7 @@ class Null:
 
     def about(self, view: View, size: "Size | None" = None) -> "Null":
         """Return the same test of other normal equations, at one size of what the tire shows."""
-        other = Null(view, self.family, self.allowed)
+        other = Null(view, self.family, self.shown, self.allowed)
         if size is not None:
             other._weighed = [each for each in other._weighed if each[0] == size]
         return other

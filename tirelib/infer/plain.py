@@ -23,10 +23,11 @@ ROUNDS = 60
 SETTLED = 0.01
 """Relative change of all variances below which they are learned."""
 START = 0.02**2
-FLOOR = {"effect": 0.1, "shape": 0.3}
-"""Least size of an effect, or of a group of shapes, over that of the largest in its family: what
-forty tires of one family hardly show, those of another may. It does not hold where families cover
-each other (`covering`)."""
+EVEN = 1.0
+"""Least that a tire shows of one block, over what its family shows of all on the average: what
+forty tires of one family hardly show, those of another may. It counts as a change of what is
+measured, in which one effect is as good as another, and does not hold where families cover each
+other (`covering`)."""
 LARGEST = 2.0
 """Most by which one tire shows more of everything than its family."""
 TINY = 1e-8
@@ -53,7 +54,7 @@ class Family:
         Most by which one tire shows more of the smooth shapes than its family. Of effects it is
         never more than `LARGEST`.
     least : mapping of block to variance
-        What the tire may show at least (`covering`). Where it is empty, `FLOOR` of the largest.
+        What the tire may show at least (`covering`). Where it is empty, `spread` says it.
     """
 
     name: str
@@ -68,25 +69,27 @@ class Family:
         return len(self.draws)
 
     def shown(self) -> dict[str, float]:
-        """Return the mean squares of coefficients by block."""
+        """Return the mean squares of coefficients by block, and `least` where it is more."""
         known = np.isfinite(self.squares)
         total = np.where(known, self.squares, 0.0).sum(axis=0)
         count = known.sum(axis=0)
         mean = np.where(count > 0, total / np.maximum(count, 1), START)
-        return dict(zip(self.blocks, mean.tolist(), strict=True))
+        shown = dict(zip(self.blocks, mean.tolist(), strict=True))
+        return shown | {k: max(least, shown.get(k, 0.0)) for k, least in self.least.items()}
 
-    def spread(self) -> dict[str, float]:
-        """Return the variances by block."""
+    def spread(self, sizes: Mapping[str, float]) -> dict[str, float]:
+        """Return the variances by block in a plan, with what it shows at least.
+
+        Parameters
+        ----------
+        sizes : mapping of block to float
+            Mean square of its rows in this plan.
+        """
         shown = self.shown()
         if self.least:
-            return {name: max(least, shown.get(name, 0.0)) for name, least in self.least.items()}
-        largest = {True: 0.0, False: 0.0}
-        for name, each in shown.items():
-            largest["," in name] = max(largest["," in name], each)
-        return {
-            name: max(each, FLOOR["shape" if "," in name else "effect"] ** 2 * largest["," in name])
-            for name, each in shown.items()
-        }
+            return shown
+        mean = float(np.mean([shown[k] * size for k, size in sizes.items() if k in shown]))
+        return {k: max(shown.get(k, 0.0), EVEN**2 * mean / size) for k, size in sizes.items()}
 
     def on(self, blocks: Mapping[str, slice], count: int) -> FloatArray:
         """Return the tires' coefficients for the rows of a user's plan, (n_tires, count).
@@ -230,8 +233,8 @@ def covering(families: Sequence[Family]) -> tuple[Family, ...]:
 
 
 def pooled(families: Sequence[Family]) -> dict[str, float]:
-    """Return variances by block over families that count the same: the metric of a fit."""
-    each = [family.spread() for family in families]
+    """Return mean squares by block over families that count the same: the metric of a fit."""
+    each = [family.shown() for family in families]
     names = dict.fromkeys(name for spread in each for name in spread)
     return {
         name: float(np.mean([spread[name] for spread in each if name in spread])) for name in names

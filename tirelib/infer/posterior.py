@@ -105,6 +105,15 @@ class Posterior:
         """Names of the model's effects."""
         return tuple(effect.name for effect in self.effects)
 
+    @property
+    def sizes(self) -> dict[str, float]:
+        """Mean squares of the rows of everything that plain tires may show, by block."""
+        return {
+            name: float(np.mean(rows**2))
+            for name, rows in self.rows.items()
+            if name != BASE and not name.startswith(ROUGHLY)
+        }
+
     def strength(self, name: str) -> FloatArray | None:
         """Return the strength of an effect, of the model or beside it; None if it has none."""
         pairs = zip(self.point.effects, self.point.strengths, strict=True)

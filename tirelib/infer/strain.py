@@ -54,6 +54,7 @@ WIDTH = {
     "contact_crown": 1.3,
     "creep": 1.3,
     "tread_spread": 1.3,
+    "centrifugal_tension": 0.01,
 }
 """Prior standard deviations of the base's coordinates: wide, the campaign informs them."""
 OWN = 0.004

@@ -78,11 +78,12 @@ PLAIN: tuple[Coordinate, ...] = (
     Coordinate("contact_crown"),
     Coordinate("creep"),
     Coordinate("tread_spread"),
+    Coordinate("centrifugal_tension"),
 )
-"""Those of the plain tire: every belt shears and has section inertia, every gage sits on layers
-that the shear force leaves alone, every tread holds on to the road with a friction that grows with
-slip, hardens and grows wider when it is pressed, spreads the pressure over its thickness, and its
-strips meet the road one after the other."""
+"""Those of the plain tire: every belt shears and has section inertia, and sidewalls that spin with
+it, every gage sits on layers that the shear force leaves alone, every tread holds on to the road
+with a friction that grows with slip, hardens and grows wider when it is pressed, spreads the
+pressure over its thickness, and its strips meet the road one after the other."""
 
 
 def coordinates(values: Mapping[str, float | FloatArray]) -> tuple[Coordinate, ...]:

@@ -52,7 +52,7 @@ def made_of(values: Values, points: Operating) -> Made:
         mass=v["mass"],
         rotary_inertia=v["rotary_inertia"],
         inflation=points.pressure * width,
-        tension=-v["section_pull"] * points.pressure * width * v["ring_radius"],
+        tension=_tension(v, points),
         k_u=v["radial_stiffness"] + v["radial_pressure_slope"] * above,
         k_v=v["tangential_stiffness"] + v["tangential_pressure_slope"] * above,
         dashpots=0.0,
@@ -73,6 +73,18 @@ def made_of(values: Values, points: Operating) -> Made:
     each = (v["innerliner_offset"], v["liner_share"], spread)
     places = [np.broadcast_to(np.asarray(x, dtype=float), (len(points),)) for x in each]
     return Made(constants, Gage(*places))
+
+
+def _tension(v: Values, points: Operating) -> FloatArray:
+    """Return the tension beyond p b R + rho A R^2 Omega^2, (n_points,), [N].
+
+    The sidewalls take some of p b. Their mass moves with the belt by about a third and pulls on it
+    by about a half, so that tension and inertia of a spinning belt do not quite balance.
+    """
+    radius = np.asarray(v["ring_radius"])
+    pulled = v["section_pull"] * points.pressure * v["belt_width"] * radius
+    spun = (v["centrifugal_tension"] - 1.0) * v["mass"] * (radius * points.omega) ** 2
+    return np.asarray(spun - pulled)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -40,6 +40,9 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
             "belt", "N m^2", "bending_stiffness", 1e-3, 1e3, "EI, in the wheel plane"
         ),
         "mass": Field("belt", "kg/m", "line_density", 0.0, 100.0, "rho A, belt and tread"),
+        "centrifugal_tension": Field(
+            "belt", "1", "ratio", 0.5, 1.5, "tension that spinning makes, over rho A R^2 Omega^2"
+        ),
         "extension_stiffness": Field(
             "belt", "N", "force", 1e4, _ANY, "EA; inf is the inextensible belt"
         ),
@@ -160,6 +163,7 @@ class Tire:
     rotary_inertia: float = 0.0
     liner_share: float = 0.0
     section_pull: float = 0.0
+    centrifugal_tension: float = 1.0
     radial_pressure_slope: float = 0.0
     radial_deflection_rate: float = 0.0
     tangential_pressure_slope: float = 0.0

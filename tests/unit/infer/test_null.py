@@ -29,7 +29,7 @@ def test_a_chi_square_has_normal_scores(count: int) -> None:
 
 def plain(families: tuple[Family, ...]) -> Hypothesis:
     toy = Toy(drawn(np.random.default_rng(2)))
-    fit = posterior(toy, (), FAMILIES[0].spread(), 0.001)
+    fit = posterior(toy, (), FAMILIES[0].shown(), 0.001)
     return judged(toy, fit, families, 0.05, own_effects=0)
 
 
@@ -65,9 +65,9 @@ def test_the_free_belt_has_a_size_of_its_own(monkeypatch: pytest.MonkeyPatch) ->
     def judged_by(families: tuple[Family, ...]) -> Hypothesis:
         random = np.random.default_rng(2)
         toy = Belt(random.standard_normal(N))
-        size = np.sqrt(families[0].spread()["smooth, free belt"])
+        size = np.sqrt(families[0].shown()["smooth, free belt"])
         toy.measured = toy.measured + 1.8 * size * random.standard_normal(SHAPES) @ toy.there
-        fit = posterior(toy, (), families[0].spread(), 0.001)
+        fit = posterior(toy, (), families[0].shown(), 0.001)
         return judged(toy, fit, families, 0.05, own_effects=0)
 
     families = tuple(belt(each) for each in FAMILIES)
@@ -78,3 +78,21 @@ def test_the_free_belt_has_a_size_of_its_own(monkeypatch: pytest.MonkeyPatch) ->
     assert together.null.size.free == together.null.size.whole
     assert together.likelihood < apart.likelihood
     assert together.scores["smooth, free belt"] >= apart.scores["smooth, free belt"]
+
+
+def test_what_a_tire_shows_at_least_does_not_depend_on_the_unit_of_a_strength() -> None:
+    """With strengths in other units, rows and what is shown change, and the strain does not."""
+    family, sizes = FAMILIES[0], {"a": 2.0, "b": 1.0, "smooth, all": 0.5}
+    blocks = {"a": 1, "b": 1, "smooth, all": 2}
+    shown = replace(family, blocks=blocks, squares=np.array([[1e-8, 4e-4, 1e-6]]))
+    other = replace(shown, squares=shown.squares * np.array([9.0, 1.0, 1.0]))
+    usual = shown.spread(sizes)
+    turned = other.spread({**sizes, "a": sizes["a"] / 9.0})
+    assert turned["a"] == pytest.approx(9.0 * usual["a"])
+    assert turned["b"] == pytest.approx(usual["b"])
+    # nothing shows less than all do on the average; the family does not know the user's own effect
+    mean = float(np.mean([2.0 * 1e-8, 4e-4, 0.5 * 1e-6]))
+    at_least = shown.spread({**sizes, "own": 3.0})
+    assert at_least["b"] == 4e-4
+    assert 2.0 * at_least["a"] == pytest.approx(mean)
+    assert 3.0 * at_least["own"] == pytest.approx(mean)

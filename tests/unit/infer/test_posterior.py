@@ -9,7 +9,7 @@ from tirelib.identify.bounded import bounded_step
 from tirelib.infer.posterior import posterior
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
-SPREAD = FAMILIES[0].spread()
+SPREAD = FAMILIES[0].shown()
 
 
 def test_a_strength_and_what_else_the_tire_shows_are_found() -> None:

@@ -26,7 +26,7 @@ def test_plain_tires_are_seldom_said_to_lack_something() -> None:
 
 def test_p_values_of_plain_tires_lie_under_the_diagonal() -> None:
     random = np.random.default_rng(6)
-    spread = FAMILIES[0].spread()
+    spread = FAMILIES[0].shown()
     p = []
     for _ in range(60):
         toy = Toy(drawn(random))

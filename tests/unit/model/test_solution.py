@@ -47,6 +47,7 @@ GRIPPING = {
     "contact_crown": 0.3,
     "creep": 0.005,
     "tread_spread": 0.3,
+    "centrifugal_tension": 0.98,
 }
 CASES: dict[str, tuple[Mapping[str, float | FloatArray], Changes]] = {
     "plain": (VALUES, ()),
@@ -78,6 +79,21 @@ def test_an_effect_is_a_tire_with_other_constants(name: str, strength: float, fi
     if field == "tread":
         values["tread_stiffness"] = values["tread_stiffness"] * (POINTS.load / 4000.0) ** strength
     assert found.waveform == pytest.approx(at(values).waveform, abs=1e-11)
+
+
+def test_tension_beyond_the_spinning_belts_own_is_what_less_inertia_leaves() -> None:
+    """What the sidewalls pull more than they weigh stiffens a belt as lost inertia does."""
+    found = at({**GRIPPING, "centrifugal_tension": 1.03})
+    lacking = at({**GRIPPING, "centrifugal_tension": 1.0}, [CATALOGUE["centrifugal"].at(-0.03)])
+    assert found.waveform == pytest.approx(lacking.waveform, abs=1e-11)
+    stiffer = at(GRIPPING).deflection - found.deflection
+    assert (stiffer > 0.0).all()
+    still = replace(POINTS, omega=np.zeros(len(POINTS)))
+    one, other = (
+        solved({**GRIPPING, "centrifugal_tension": x}, still, (), low_pass=LOW_PASS).deflection
+        for x in (0.9, 1.1)
+    )
+    assert one == pytest.approx(other, rel=1e-12)
 
 
 def test_constants_follow_the_deflection_that_they_cause() -> None:
