@@ -142,7 +142,7 @@ def test_the_document_says_what_was_done(document: dict[str, Any], campaign: Pat
     assert document["gages"] == [1, 2, 3, 4, 5]
     assert document["noise_ustrain"] is None, "nothing was repeated"
     matrix = np.array(document["correlation"])
-    assert matrix.shape == (18, 18)
+    assert matrix.shape == (19, 19)
     assert np.diag(matrix) == pytest.approx(1.0)
     assert document["provenance"]["data_sha256"] == read_campaign(campaign).content_hash()
     keys = {"name", "meaning", "value", "std", "low", "high", "fit_std", "unit", "flags", "helps"}

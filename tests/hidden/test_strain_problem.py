@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hidden.cases import load_case
 
+from tirelib.arrays import FloatArray
 from tirelib.effects import CATALOGUE
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
@@ -26,6 +27,26 @@ def problem() -> StrainProblem:
     case = load_case(CASE)
     runs = straight_runs(case.waves.take(~case.held_out))
     return StrainProblem(runs, estimated(runs)[1].values, list(CATALOGUE.values()))
+
+
+def test_a_narrow_prior_stands_where_it_comes_from(problem: StrainProblem) -> None:
+    """A fit that has moved such a number pays for it, and the model is the one that was given."""
+    values = {**problem.values, "centrifugal_tension": 1.05}
+    moved = StrainProblem(problem.runs, values, ())
+    k = [c.name for c in moved.free].index("centrifugal_tension")
+    assert moved.start.base[k] == pytest.approx(np.log(1.05))
+    assert np.delete(moved.start.base, k) == pytest.approx(0.0)
+    held = problem.model_at(Point(np.zeros(len(problem.free) + 1)), problem.data.points)
+    there = moved.solve(moved.start).model
+    assert there.made.constants.tension == pytest.approx(
+        held.made.constants.tension + 0.05 * spun(problem)
+    )
+
+
+def spun(problem: StrainProblem) -> FloatArray:
+    """Return rho A R^2 Omega^2, (n_runs,), [N]."""
+    values, omega = problem.values, problem.data.points.omega
+    return np.asarray(values["mass"] * (values["ring_radius"] * omega) ** 2)
 
 
 def test_slopes_are_those_of_the_model(problem: StrainProblem) -> None:

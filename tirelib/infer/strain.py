@@ -57,6 +57,8 @@ WIDTH = {
     "centrifugal_tension": 0.01,
 }
 """Prior standard deviations of the base's coordinates: wide, the campaign informs them."""
+MEAN = {"centrifugal_tension": 1.0}
+"""Means of priors that are narrow. All others stand about the model's own numbers."""
 OWN = 0.004
 """A run's own misfit over its rms strain, in the contact."""
 LEAST_STEP = 1e-3
@@ -178,12 +180,15 @@ class StrainProblem:
         effects: Sequence[Effect] = (),
         strengths: Sequence[FloatArray] = (),
     ) -> None:
-        self.runs, self.values = runs, dict(values)
+        self.runs = runs
         self.data = runs.data(with_deflection=False)
         self.free = coordinates(values)
-        self.start = Point(np.zeros(len(self.free) + 1), tuple(effects), tuple(strengths))
+        means = {c.name: MEAN[c.name] for c in self.free if c.name in MEAN}
+        self.values = {**values, **means}
+        begin = [float(np.max(c.distance(self.values[c.name], values[c.name]))) for c in self.free]
+        self.start = Point(np.array([*begin, 0.0]), tuple(effects), tuple(strengths))
         self.widths = np.array([*(WIDTH[c.name] for c in self.free), STD / UNIT])
-        ends = [c.ends(float(np.max(values[c.name]))) for c in self.free]
+        ends = [c.ends(float(np.max(self.values[c.name]))) for c in self.free]
         low, high = np.array([*ends, (-np.inf, np.inf)]).T  # a delay has none
         self.ends = low, high
         typical = float(np.sqrt(np.mean(runs.strain**2)))
