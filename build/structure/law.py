@@ -24,7 +24,7 @@ from tirelib.identify.campaign_data import straight_runs
 from tirelib.infer.hypothesis import law_errors
 from tirelib.infer.null import OWN, Null
 from tirelib.infer.plain import BASE, Family, load, pooled
-from tirelib.infer.posterior import posterior
+from tirelib.infer.posterior import posterior, sizes_at_start
 from tirelib.infer.strain import StrainProblem
 from tirelib.threads import one_thread
 
@@ -66,7 +66,13 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
         problem = StrainProblem(runs, values, list(CATALOGUE.values()))
         own = max(family.own for family in others)
         start = [np.zeros(CATALOGUE[kind].components)]
-        fit = posterior(problem, [CATALOGUE[kind]], pooled(others), own, strengths=start)
+        fit = posterior(
+            problem,
+            [CATALOGUE[kind]],
+            pooled(others, sizes_at_start(problem)),
+            own,
+            strengths=start,
+        )
     except TirelibError as error:
         say(f"{file.name}: {error}")
         return None

@@ -23,7 +23,7 @@ ROUNDS = 60
 SETTLED = 0.01
 """Relative change of all variances below which they are learned."""
 START = 0.02**2
-EVEN = 1.0
+EVEN = 0.5
 """Least that a tire shows of one block, over what its family shows of all on the average: what
 forty tires of one family hardly show, those of another may. It counts as a change of what is
 measured, in which one effect is as good as another, and does not hold where families cover each
@@ -232,9 +232,12 @@ def covering(families: Sequence[Family]) -> tuple[Family, ...]:
     return tuple(replace(family, least=least) for family in families)
 
 
-def pooled(families: Sequence[Family]) -> dict[str, float]:
-    """Return mean squares by block over families that count the same: the metric of a fit."""
-    each = [family.shown() for family in families]
+def pooled(families: Sequence[Family], sizes: Mapping[str, float]) -> dict[str, float]:
+    """Return variances by block over families that count the same: the metric of a fit.
+
+    The sizes are those of `Family.spread`.
+    """
+    each = [family.spread(sizes) for family in families]
     names = dict.fromkeys(name for spread in each for name in spread)
     return {
         name: float(np.mean([spread[name] for spread in each if name in spread])) for name in names

@@ -108,11 +108,7 @@ class Posterior:
     @property
     def sizes(self) -> dict[str, float]:
         """Mean squares of the rows of everything that plain tires may show, by block."""
-        return {
-            name: float(np.mean(rows**2))
-            for name, rows in self.rows.items()
-            if name != BASE and not name.startswith(ROUGHLY)
-        }
+        return _sizes(self.rows)
 
     def strength(self, name: str) -> FloatArray | None:
         """Return the strength of an effect, of the model or beside it; None if it has none."""
@@ -305,6 +301,24 @@ def explaining(
         if not effect.exact:
             every[ROUGHLY + effect.name] = errors
     return every, slopes
+
+
+def sizes_at_start(problem: Problem) -> dict[str, float]:
+    """Return mean squares of rows as `Posterior.sizes`, of the model where a fit starts."""
+    point = _start(
+        problem, [*problem.start.effects, *problem.living], None, problem.start.strengths
+    )
+    solved = problem.solve(point)
+    rows, _ = explaining(problem, point, solved, len(problem.start.effects))
+    return _sizes(rows)
+
+
+def _sizes(rows: Mapping[str, FloatArray]) -> dict[str, float]:
+    return {
+        name: float(np.mean(each**2))
+        for name, each in rows.items()
+        if name != BASE and not name.startswith(ROUGHLY)
+    }
 
 
 def _start(

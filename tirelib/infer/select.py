@@ -23,7 +23,7 @@ from tirelib.errors import ParameterError, TirelibError
 from tirelib.forked import forked
 from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.plain import Family, pooled
-from tirelib.infer.posterior import SETTLED, Posterior, posterior
+from tirelib.infer.posterior import SETTLED, Posterior, posterior, sizes_at_start
 from tirelib.infer.problem import Problem
 from tirelib.infer.rival import p_against
 from tirelib.threads import one_thread
@@ -121,7 +121,7 @@ class Hypotheses:
             )
         self.families = tuple(families)
         self.false_alarm, self.progress = false_alarm, progress
-        self.spread = pooled(families)
+        self.spread = pooled(families, sizes_at_start(problem))
         self.own = max(family.own for family in families)
         self.had = problem.start.effects
         self.effects = {effect.name: effect for effect in problem.living}

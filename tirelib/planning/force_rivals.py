@@ -185,7 +185,7 @@ def structure_rows(joint: Problem, present: int, base: ForceFit) -> FloatArray:
         effects=base.effects,
         strengths=base.strengths,
     )
-    spread = pooled(plain_tires(joint.quantity))
+    spread = pooled(plain_tires(joint.quantity), {})
     at, others = problem.start, problem.living
     strengths = (*at.strengths, *(np.zeros(effect.components) for effect in others))
     point = Point(at.base, (*at.effects, *others), strengths)
