@@ -25,6 +25,8 @@ C99 = ("-std=c99", "-pedantic", "-ffp-contract=off")
 """The core's language; a product must not be fused with a sum."""
 SHARED = ("-shared", "-s")
 LINUX = ("-fPIC", "-Wl,--build-id=none")
+MAC = ("-Wl,-install_name,@rpath/StrainTire.dylib",)
+"""Without a name the linker takes the path of its output, which is another one in every run."""
 CORE = (*SHARED, "-O2", *C99, *STRICT, "-fno-sanitize=undefined", "-fvisibility=hidden")
 GATE = (*SHARED, "-Os", "-std=c11", *STRICT, "-fvisibility=default")
 _CPU = {"x86_64": (0x01000007, 3), "aarch64": (0x0100000C, 0)}
@@ -86,7 +88,7 @@ BINARIES = {
     ),
     "binaries/win64/StrainTire.dll": Binary(_CORE, CORE, ("x86_64-windows-gnu",)),
     "binaries/darwin64/StrainTire.dylib": Binary(
-        _CORE, CORE, ("x86_64-macos.11.0", "aarch64-macos.11.0")
+        _CORE, (*CORE, *MAC), ("x86_64-macos.11.0", "aarch64-macos.11.0")
     ),
     "gate/linux64.so": Binary(
         ("gate/gate.c", "fmi2/fmi2.h"), (*GATE, *LINUX), ("x86_64-linux-gnu.2.17",), ("-ldl",)

@@ -266,7 +266,7 @@ def test_the_binaries_were_made_from_the_sources(place: str) -> None:
     assert said in (ROOT / "fmu_src" / place).read_bytes(), "run python build/native_fmu.py"
 
 
-@pytest.mark.parametrize("place", [f"binaries/{BINARIES[0]}", GATE])
+@pytest.mark.parametrize("place", [*(f"binaries/{name}" for name in BINARIES), GATE])
 def test_the_compiler_makes_the_same_binary_again(place: str) -> None:
     if importlib.util.find_spec("ziglang") is None:
         pytest.skip("ziglang is not installed: only who makes the binaries needs it")
