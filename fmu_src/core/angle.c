@@ -5,9 +5,9 @@ enum { NEWTON = 8 };
 static const double LARGEST_RATIO = 2.0, ENDS = 17.0 / 240.0; /* ENDS: squared */
 
 /* numpy.polynomial.polynomial.polyval */
-static double polynomial(const double *c, int terms, double x) {
+static double polynomial(const double *c, int64_t terms, double x) {
     double y = c[terms - 1];
-    for (int k = terms - 2; k >= 0; k--) y = c[k] + y * x;
+    for (int64_t k = terms - 2; k >= 0; k--) y = c[k] + y * x;
     return y;
 }
 
@@ -19,7 +19,7 @@ double law_sample(const AngleLaw *law, double phi) {
     double x = phi / (2.0 * PI);
     for (int i = 0; i < NEWTON; i++) {
         double angle = 0.0, rate = 0.0;
-        for (int k = law->terms - 1; k >= 0; k--) {
+        for (int64_t k = law->terms - 1; k >= 0; k--) {
             rate = rate * x + angle;
             angle = angle * x + law->angle[k];
         }
@@ -37,7 +37,7 @@ double minmod(double a, double b) {
 /* The slope of q that is followed, a turn's, and the doubt of q; relative. Reference: _followed. */
 static double followed(const Past *past, int column, double turn, double *doubt) {
     double slope[3] = {NAN, NAN, NAN};
-    int last = past->n - 1;
+    int64_t last = past->n - 1;
     for (int k = 0; k < 3 && last - k > 0; k++) {
         const double *now = past->row[last - k], *before = past->row[last - k - 1];
         slope[k] = (now[column] - before[column]) / (now[PAST_TIME] - before[PAST_TIME]) * turn /

@@ -10,14 +10,14 @@ enum { ANGLE_TERMS = COURSE_TERMS + 2 };
 
 /* For each of the last turns: its middle in time [samples], and q for each source and without. */
 typedef struct {
-    int n;
+    int64_t n; /* as wide as a double: states hold this, and no byte of theirs is left to chance */
     double row[REMEMBERED][PAST_COLUMNS];
 } Past;
 
 /* AngleLaw of the reference. */
 typedef struct {
     double middle, turn;
-    int terms;
+    int64_t terms;
     double angle[ANGLE_TERMS];
     double step, std, speed, slip_std, late;
     Past past;

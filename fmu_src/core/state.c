@@ -9,7 +9,7 @@ typedef struct {
     int64_t gages, samples, axes, queued, first, rows, live, cutter, calibration;
 } Head;
 
-static const char FORMAT[16] = "tire-state/2";
+static const char FORMAT[16] = "tire-state/3";
 
 /* Hash of bytes, so that damage is seen (FNV-1a, G. Fowler, L. C. Noll, K.-P. Vo, 1991). */
 static uint64_t hash(const unsigned char *bytes, size_t n) {
@@ -25,6 +25,7 @@ static int64_t oldest(const Cutter *c) {
     if (f->middles && (int64_t)f->last_rise - 1 < first) first = (int64_t)f->last_rise - 1;
     if (c->has_previous && c->queued && (int64_t)c->previous.rise - 1 < first)
         first = (int64_t)c->previous.rise - 1;
+    first -= NEAR_EDGE; /* they tell whether the contact is damaged */
     return first > base ? first : base;
 }
 

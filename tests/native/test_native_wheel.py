@@ -8,6 +8,8 @@ import pytest
 
 from tests.fmu import live
 from tests.native.wheels import AXES, REASONS, NativeWheel
+from tests.synthetic import record
+from tirelib.flags import TurnFlag
 from tirelib.fmu.refusals import StepError
 from tirelib.fmu.wheel import Wheel
 from tirelib.held import HELD
@@ -174,6 +176,27 @@ def test_a_state_goes_on_exactly_alike(core: ctypes.CDLL, kind: str) -> None:
         following = index + len(starts[index : index + TURN // 10])
         if following < len(states):
             assert one.state() == states[following]
+
+
+@pytest.mark.parametrize("gap", [6, 7])
+def test_a_gap_before_the_first_contact_is_remembered_within_it(
+    core: ctypes.CDLL, gap: int
+) -> None:
+    """At 200 Hz the contact begins with sample 8; what lies before tells that it is damaged."""
+    strain, known = record(turns=4.6, speed=live.SPEED, rate=200.0)[0], live.calibration()
+    strain[2, gap] = np.nan
+    one, other = (NativeWheel(core, known, 200.0, 1) for _ in range(2))
+    flags = set()
+    for sample in range(strain.shape[1]):
+        frame = np.ascontiguousarray(strain[:, sample])
+        if sample == 12:
+            assert other.restore(one.state())
+        for wheel in (one, other) if sample >= 12 else (one,):
+            wheel.step(frame, 1 / 200.0, True, conditions_at(1))
+        if sample >= 12:
+            assert repr(other.outputs()) == repr(one.outputs())
+            flags.add(one.outputs()[1][1])
+    assert any(told & TurnFlag.GAP for told in flags)
 
 
 def test_what_is_no_state_of_the_wheel_is_refused(core: ctypes.CDLL) -> None:

@@ -151,6 +151,7 @@ class TurnCutter:
         first = self._finder.oldest
         if self._waiting and self._previous is not None:
             first = min(first, int(self._previous.middle) - 1)
+        first -= NEAR_EDGE  # they tell whether the contact is damaged
         return max(self._base, min(first, self._base + self._filled))
 
     def needed(self) -> FloatArray:

@@ -8,9 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.fmu import live
+from tests.synthetic import record
 from tirelib.errors import FormatError
+from tirelib.flags import TurnFlag
+from tirelib.signal import TurnCutter
 from tirelib.stream import StreamEstimator
-from tirelib.stream.snapshot import from_plain, to_plain
+from tirelib.stream.snapshot import from_plain, restore_cutter, snapshot_cutter, to_plain
 
 HELD = {"speed": live.SPEED, "pressure": live.PRESSURE, "camber": 0.0}
 
@@ -60,6 +63,19 @@ def test_it_goes_on_alike_from_every_sample_round_the_edges_of_a_contact() -> No
             other.restore(json.loads(json.dumps(one.state())))
             turns = other.push(strain[:, at:], **HELD)
             assert json.dumps(to_plain(turns[-1])) in wanted
+
+
+@pytest.mark.parametrize("gap", [6, 7])
+def test_a_gap_before_the_first_contact_is_remembered_within_it(gap: int) -> None:
+    """At 200 Hz the contact begins with sample 8; what lies before tells that it is damaged."""
+    strain = record(turns=4.6, speed=live.SPEED, rate=200.0)[0]
+    strain[2, gap] = np.nan
+    one, other = (TurnCutter(live.calibration().lateral, 200.0) for _ in range(2))
+    one.push(strain[:, :12], speed=live.SPEED)
+    restore_cutter(other, snapshot_cutter(one))
+    wanted, got = (cutter.push(strain[:, 12:], speed=live.SPEED) for cutter in (one, other))
+    assert wanted[1].flags & TurnFlag.GAP
+    assert [turn.flags for turn in got] == [turn.flags for turn in wanted]
 
 
 def test_restoring_twice_rolls_back() -> None:
