@@ -13,6 +13,7 @@ typedef struct {
     const Constants *k;
     const Chain *chain;
     double *values;
+    int near_load, near_force; /* whether it lies near the data of load and force */
 } Turned;
 
 /* Reference: Estimate.widened */
@@ -23,14 +24,10 @@ static void widen(Estimate *e, double more) {
 
 /* Reference: Chain._valid and STANDS_ON */
 static int valid(const Turned *t, int quantity, double value, double std) {
-    const Chain *c = t->chain;
     if (!isfinite(value) || !isfinite(std)) return 0;
-    if ((quantity == FZ || quantity == ALPHA) && c->load.there && !within_data(&c->load, t->values))
-        return 0;
-    if ((quantity == FY || quantity == ALPHA) && c->force.there &&
-        !within_data(&c->force, t->values))
-        return 0;
-    return all_inside(&c->guard[quantity], t->values, value);
+    if ((quantity == FZ || quantity == ALPHA) && !t->near_load) return 0;
+    if ((quantity == FY || quantity == ALPHA) && !t->near_force) return 0;
+    return all_inside(&t->chain->guard[quantity], t->values, value);
 }
 
 /* Standard deviation that an unknown or corrected tread leaves, per unit of what it does. */
@@ -40,10 +37,10 @@ static double hardening_std(const Turned *t, double doubt_of_known) {
 }
 
 /* Reference: the load in Chain.predict */
-static void find_load(const Turned *t, int calibrated, Estimate *e) {
+static void find_load(Turned *t, int calibrated, Estimate *e) {
     const Chain *c = t->chain;
     double extra, unused;
-    double load = predicted(&c->load, t->k, t->values, &e->std);
+    double load = judged(&c->load, t->k, t->values, &e->std, &t->near_load);
     load += load_correction(&c->laws, t->k, t->values, &extra);
     load += c->load_per_hardening * hardened(&c->road, t->k, t->values, &unused);
     e->std = hypot(e->std, extra + speed_spread(&c->laws, t->k, t->values, load));
@@ -206,11 +203,11 @@ static void find_angle(const Turned *t, double load, double spread, const Told *
 }
 
 /* Reference: Chain._lateral */
-static void find_lateral(const Turned *t, double load, int calibrated, Prediction *result) {
+static void find_lateral(Turned *t, double load, int calibrated, Prediction *result) {
     const Chain *c = t->chain;
     const Constants *k = t->k;
     Estimate *e = &result->of[FY], *fz = &result->of[FZ];
-    double std, doubt, tilted, force = predicted(&c->force, k, t->values, &std);
+    double std, doubt, tilted, force = judged(&c->force, k, t->values, &std, &t->near_force);
     double factor = force_factor(&c->force_laws, k, t->values, &doubt);
     double law = doubt * fabs(force);
     law += speed_spread(&c->force_laws, k, t->values, factor * force);
@@ -240,7 +237,7 @@ static void find_lateral(const Turned *t, double load, int calibrated, Predictio
 void chain_predict(const Calibration *calibration, const Chain *c, double *values, double *scratch,
                    Prediction *result) {
     const Constants *k = &calibration->constants;
-    Turned t = {calibration, k, c, values};
+    Turned t = {calibration, k, c, values, 1, 1};
     int plausible = 1;
     memset(result, 0, sizeof *result);
     result->radius = NAN;

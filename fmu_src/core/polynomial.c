@@ -18,27 +18,36 @@ void design(const Form *form, const double *values, double *terms) {
     for (int v = 0; v < form->variables; v++) z[v] = standardised(form, v, values);
     for (int t = 0; t < form->terms; t++) {
         const double *exponent = form->exponent + t * form->variables;
-        terms[t] = 1.0;
-        for (int v = 0; v < form->variables; v++) terms[t] *= power(z[v], (int)exponent[v]);
+        double product = 1.0;
+        for (int v = 0; v < form->variables; v++) /* most are zero */
+            if (exponent[v] > 0.0) product *= power(z[v], (int)exponent[v]);
+        terms[t] = product;
     }
 }
 
-/* Variance that uncertain coefficients leave. Reference: leverage */
+/* Variance that uncertain coefficients leave, from the half of the covariance below its diagonal;
+ * four sums at once, which do not wait for each other. Reference: leverage */
 static double leverage(const double *x, const double *covariance, int n) {
-    double sum = 0.0;
+    double variance = 0.0;
     for (int i = 0; i < n; i++) {
-        double row = 0.0;
-        for (int j = 0; j < n; j++) row += covariance[i * n + j] * x[j];
-        sum += row * x[i];
+        const double *row = covariance + i * n;
+        double sum[4] = {0.0};
+        int j = 0;
+        for (; j + 4 <= i; j += 4)
+            for (int k = 0; k < 4; k++) sum[k] += row[j + k] * x[j + k];
+        for (; j < i; j++) sum[0] += row[j] * x[j];
+        double below = (sum[0] + sum[1]) + (sum[2] + sum[3]);
+        variance += x[i] * (row[i] * x[i] + 2.0 * below);
     }
-    return sum;
+    return variance;
 }
 
-double predicted(const Polynomial *p, const Constants *k, const double *values, double *std) {
+double judged(const Polynomial *p, const Constants *k, const double *values, double *std, int *near) {
     double x[TERMS], value = 0.0;
     design(&p->form, values, x);
     for (int t = 0; t < p->form.terms; t++) value += x[t] * p->coefficient[t];
     double uncertain = leverage(x, p->covariance, p->form.terms);
+    *near = !p->bordered || uncertain <= p->far;
     if (p->bordered) uncertain += p->growth * maximum(uncertain - p->near, 0.0);
     if (p->pulled != 0.0) {
         double square = values[V_TRACTION] * values[V_TRACTION];
@@ -48,11 +57,9 @@ double predicted(const Polynomial *p, const Constants *k, const double *values, 
     return value;
 }
 
-int within_data(const Polynomial *p, const double *values) {
-    double x[TERMS];
-    if (!p->bordered) return 1;
-    design(&p->form, values, x);
-    return leverage(x, p->covariance, p->form.terms) <= p->far;
+double predicted(const Polynomial *p, const Constants *k, const double *values, double *std) {
+    int near;
+    return judged(p, k, values, std, &near);
 }
 
 double slope_by(const Polynomial *p, const double *values, int value) {

@@ -11,11 +11,11 @@ double standardised(const Form *form, int variable, const double *values);
 /* The terms' values. Reference: design */
 void design(const Form *form, const double *values, double *terms);
 
+/* Value, standard deviation, and whether the data are near. Reference: Polynomial.judge */
+double judged(const Polynomial *p, const Constants *k, const double *values, double *std, int *near);
+
 /* Value and standard deviation. Reference: Polynomial.predict */
 double predicted(const Polynomial *p, const Constants *k, const double *values, double *std);
-
-/* Reference: Polynomial.judge */
-int within_data(const Polynomial *p, const double *values);
 
 /* Derivative by a value. Reference: Polynomial.slope */
 double slope_by(const Polynomial *p, const double *values, int value);
