@@ -5,7 +5,7 @@ They are offered as `tirelib.identify`, `tirelib.compare`, `tirelib.diagnose`, `
 `read_tire` returns it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from tirelib.errors import CalibrationError, ParameterError
@@ -127,8 +127,6 @@ def diagnose(
 
         case = force_case(campaign, model, catalogue, quantity)
         return assess_forces(case, effects_of, false_alarm=false_alarm, progress=progress)
-    import numpy as np
-
     from tirelib.compare.model import model_of
     from tirelib.diagnose.diagnose import diagnose as diagnose_strain
     from tirelib.diagnose.document import assess
@@ -136,47 +134,50 @@ def diagnose(
     from tirelib.waveforms import measure_waveforms
 
     given = model_of(model, catalogue)
-    used = [each for each in given.used if each.effect.hook != "brush"]
+    has, strengths = given.of_strain
     found = diagnose_strain(
         straight_runs(measure_waveforms(campaign, progress=progress)),
         given.values,
         effects_of,
-        effects=[each.effect for each in used],
-        strengths=[np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used],
+        effects=has,
+        strengths=strengths,
         false_alarm=false_alarm,
         progress=progress,
     )
-    return assess(found, given, progress=progress)
+    return assess(found, given)
 
 
 def add(
-    effect: "str | Effect",
+    effect: "str | Effect | Sequence[str | Effect]",
     model: "TireFile",
     campaign: "Campaign",
     quantity: str | None = None,
     *,
     effects: "Mapping[str, Effect] | None" = None,
+    diagnosis: "Assessment | ForceAssessment | None" = None,
     progress: Progress | None = None,
 ) -> "tuple[TireFile, dict[str, Any]]":
-    """Add an effect to a model and fit the model again.
+    """Add an effect, or several at once, to a model and fit the model again.
 
     Parameters
     ----------
-    effect : str or Effect
-        An effect, or its name in `effects`.
+    effect : str or Effect, or a sequence of them
+        Effects, or their names in `effects`.
     model, campaign, effects, progress
         As of `compare`.
     quantity : str, optional
         Measured quantity to fit; by default strain, for an effect of the brush the force that it
         helps most.
+    diagnosis : Assessment or ForceAssessment, optional
+        What `diagnose` said of this campaign and model: its fits are taken over.
 
     Returns
     -------
     model : TireFile
-        With the effect, its strength and the step in its history.
+        With the effect, its strength and the step in its history; with several, a step for each.
     document : dict
-        What ``tirelib add --json`` writes: errors before and after, on what was fitted and on what
-        was left out.
+        What ``tirelib add --json`` writes, of the last effect: errors before and after, on what was
+        fitted and on what was left out.
 
     Raises
     ------
@@ -185,31 +186,17 @@ def add(
     CalibrationError
         If the campaign cannot inform the effect.
     """
+    from tirelib.extend.additions import additions
     from tirelib.extend.extension import known_effect
 
     _check_quantity(quantity)
     catalogue = _catalogue(effects)
-    chosen = known_effect(effect, catalogue) if isinstance(effect, str) else effect
-    if quantity not in (None, "strain") or (quantity is None and chosen.hook == "brush"):
-        from tirelib.diagnose.forces.assess import force_cases
-        from tirelib.extend.force_document import force_extended_file, force_extension_document
-        from tirelib.extend.force_extension import add_brush_effect, case_for
-
-        case = case_for(force_cases(campaign, model, catalogue, quantity), chosen)
-        step = add_brush_effect(case, chosen, progress=progress)
-        new = force_extended_file(model, step, campaign.content_hash())
-        return new, force_extension_document(step, new)
-    from tirelib.compare.model import model_of
-    from tirelib.extend.document import extension_document
-    from tirelib.extend.extension import add_effect
-    from tirelib.extend.model_file import extended_file
-    from tirelib.identify.campaign_data import straight_runs
-    from tirelib.waveforms import measure_waveforms
-
-    runs = straight_runs(measure_waveforms(campaign, progress=progress))
-    done = add_effect(runs, model_of(model, catalogue), chosen, progress=progress)
-    extended = extended_file(model, done, campaign.content_hash())
-    return extended, extension_document(done, extended)
+    given = effect if isinstance(effect, Sequence) and not isinstance(effect, str) else [effect]
+    chosen = [known_effect(e, catalogue) if isinstance(e, str) else e for e in given]
+    steps = additions(
+        chosen, model, campaign, quantity, catalogue, diagnosis=diagnosis, progress=progress
+    )
+    return list(steps)[-1]
 
 
 def simulate(

@@ -40,7 +40,8 @@ class Folder:
 def use(patch: pytest.MonkeyPatch, measured: Waveforms) -> None:
     for verb in ("diagnose", "add"):
         patch.setattr(f"tirelib.cli.{verb}.read_campaign", lambda path: Folder(measured))
-    patch.setattr("tirelib.waveforms.measure_waveforms", lambda c, progress: c.measured)
+    for module in ("waveforms", "extend.additions"):
+        patch.setattr(f"tirelib.{module}.measure_waveforms", lambda c, progress: c.measured)
 
 
 def call(*words: object) -> Result:
@@ -64,7 +65,8 @@ def test_the_named_effect_is_added_and_no_longer_a_candidate(
     model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     use(monkeypatch, waves(EFFECT, STRENGTH))
-    monkeypatch.setattr("tirelib.extend.extension.add_effect", lambda *_, **__: added()[0])
+    monkeypatch.setattr("tirelib.extend.additions.extended", lambda *_: added()[0])
+    monkeypatch.setattr("tirelib.extend.additions.strain_models", lambda *_: None)
     second, target = tmp_path / "M2.toml", tmp_path / "A.json"
     found = call(
         "add", EFFECT, "--model", model, "--data", "anywhere", "--out", second, "--json", target

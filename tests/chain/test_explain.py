@@ -221,6 +221,10 @@ def test_every_step_is_linked_and_every_error_is_one_number(
     steps = [json.loads((found.out / f"added-{name}.json").read_text()) for name in told["added"]]
     # contacts solved from another start, and points that were thinned, differ by rounding
     assert diagnosis["error_before"] == pytest.approx(before["error"], rel=1e-6)
+    assert diagnosis["error_after"] == pytest.approx(after["error"], rel=1e-6)
+    assert diagnosis["floor"] == pytest.approx(told["floor"])
+    for key in ("heldout_error_before", "heldout_error_after"):
+        assert diagnosis[key] == told[key], key
     assert steps[0]["error_before"] == pytest.approx(before["error"], rel=1e-6)
     assert steps[-1]["error_after"] == pytest.approx(after["error"], rel=1e-6)
     every = [before, after, diagnosis, *steps]

@@ -1,6 +1,5 @@
 """``tirelib add``: put an effect into a model, take it out, or undo the last step."""
 
-from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +19,6 @@ from tirelib.errors import ParameterError
 from tirelib.journey import QUANTITIES
 
 if TYPE_CHECKING:
-    from tirelib.campaign import Campaign
-    from tirelib.effects import Effect
     from tirelib.parameters import TireFile
 
 _EXAMPLE = """\b
@@ -29,20 +26,22 @@ Examples:
   tirelib rig --plan short --hide sidewall_damping=0.05 --out straight
   tirelib identify straight --out M.toml
   tirelib add sidewall_damping --model M.toml --data straight --out M2.toml --report added
+  tirelib add tread_friction gage_length --model M.toml --data straight --out M3.toml
   tirelib add sidewall_damping --remove --model M2.toml --data straight --out M3.toml
   tirelib add --undo --model M2.toml --out M1.toml
 
 \b
-The base model and all strengths are fitted again. Held-out errors are on the highest load and the
-highest pressure, each left out of the fit; of a sweep of forces, on blocks of time. An effect of
-the brush is fitted to --quantity, else to the force of the model's last such step, else to the one
-whose error it lowers most. Exit code: 0 done, 2 bad input.
+The base model and all strengths are fitted again. Several effects are fitted together; each is a
+step of the model's history, and the files are those of the last one. Held-out errors are on the
+highest load and the highest pressure, each left out of the fit; of a sweep of forces, on blocks of
+time. An effect of the brush is fitted to --quantity, else to the force of the model's last such
+step, else to the one whose error it lowers most. Exit code: 0 done, 2 bad input.
 """
 FORMAT = "tirelib-model/1"
 
 
 @click.command(epilog=_EXAMPLE)
-@click.argument("effect_name", metavar="EFFECT", required=False)
+@click.argument("effect_names", metavar="[EFFECT]...", nargs=-1)
 @model_option
 @click.option(
     "--data", "folder", metavar="CAMPAIGN", type=CAMPAIGN, help="Campaign to fit (not for --undo)."
@@ -74,7 +73,7 @@ FORMAT = "tirelib-model/1"
 @json_option()
 @progress_options
 def add(
-    effect_name: str | None,
+    effect_names: tuple[str, ...],
     model_name: str,
     folder: Path | None,
     effect_files: tuple[Path, ...],
@@ -85,21 +84,25 @@ def add(
     report: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Add EFFECT to a model, fit it to CAMPAIGN and show how the error changes."""
+    """Add effects to a model, fit it to CAMPAIGN and show how the error changes."""
     if quantity is not None and quantity not in QUANTITIES:
         raise ParameterError(
             f"--quantity {quantity}: allowed are {', '.join(QUANTITIES)}; correct the name"
         )
     if undo:
-        if effect_name is not None or remove:
+        if effect_names or remove:
             raise ParameterError("--undo takes neither EFFECT nor --remove; leave them out")
         _undo(model_name, out, json_file)
         return
-    if effect_name is None:
+    if not effect_names:
         raise ParameterError("EFFECT is missing; name an effect, or give --undo")
     if folder is None:
         raise ParameterError("--data is missing; give the campaign that the model is fitted to")
-    _change(effect_name, model_name, folder, effect_files, remove, quantity, out, report, json_file)
+    if remove and len(effect_names) > 1:
+        raise ParameterError("--remove takes one EFFECT; remove them one after the other")
+    _change(
+        effect_names, model_name, folder, effect_files, remove, quantity, out, report, json_file
+    )
 
 
 def _undo(model_name: str, out: Path, json_file: Path | None) -> None:
@@ -128,7 +131,7 @@ def _undo(model_name: str, out: Path, json_file: Path | None) -> None:
 
 
 def _change(
-    effect_name: str,
+    effect_names: tuple[str, ...],
     model_name: str,
     folder: Path,
     effect_files: tuple[Path, ...],
@@ -138,27 +141,42 @@ def _change(
     report: Path | None,
     json_file: Path | None,
 ) -> None:
+    from tirelib.extend.additions import additions, removal
     from tirelib.extend.extension import known_effect
     from tirelib.model.registration import registered_effects
-    from tirelib.parameters import read_tire, write_tire
+    from tirelib.parameters import read_tire
 
     catalogue = registered_effects(effect_files)
-    effect = known_effect(effect_name, catalogue)
+    effects = [known_effect(name, catalogue) for name in effect_names]
     file = read_tire(model_name)
     campaign = read_campaign(folder)
-    of_forces = quantity not in (None, "strain") or (quantity is None and effect.hook == "brush")
+    about = file, campaign, quantity, catalogue
     with progress_bar("fitting") as progress:
-        if of_forces:
-            new, document = _forces(campaign, file, effect, catalogue, quantity, remove, progress)
+        if remove:
+            steps = [removal(effects[0], *about, progress=progress)]
         else:
-            new, document = _strain(campaign, file, effect, catalogue, remove, progress)
+            steps = list(additions(effects, *about, progress=progress))
+    for _, document in steps:
+        _say(document)
+    new, document = steps[-1]
+    write_step(new, document, out, report, json_file)
+
+
+def write_step(
+    new: "TireFile",
+    document: dict[str, Any],
+    out: Path,
+    report: Path | None,
+    json_file: Path | None,
+) -> None:
+    """Write the model after a step, the step's page and its numbers; say where they are."""
+    from tirelib.parameters import write_tire
+    from tirelib.report.extension import write_extension
+
     write_tire(new, out, FORMAT)
-    _say(document, effect)
     console = output()
     console.print(f"written: {out}")
     if report is not None:
-        from tirelib.report.extension import write_extension
-
         for path in write_extension(document, report):
             console.print(f"written: {path}")
     if json_file is not None:
@@ -166,50 +184,7 @@ def _change(
         console.print(f"written: {json_file}")
 
 
-def _strain(
-    campaign: "Campaign",
-    file: "TireFile",
-    effect: "Effect",
-    catalogue: Mapping[str, "Effect"],
-    remove: bool,
-    progress: Callable[[str], None],
-) -> tuple["TireFile", dict[str, Any]]:
-    from tirelib.compare.model import model_of
-    from tirelib.extend.document import extension_document
-    from tirelib.extend.extension import add_effect, remove_effect
-    from tirelib.extend.model_file import extended_file
-    from tirelib.identify.campaign_data import straight_runs
-    from tirelib.waveforms import measure_waveforms
-
-    model = model_of(file, catalogue)
-    step = remove_effect if remove else add_effect
-    runs = straight_runs(measure_waveforms(campaign, progress=progress))
-    done = step(runs, model, effect, progress=progress)
-    new = extended_file(file, done, campaign.content_hash())
-    return new, extension_document(done, new)
-
-
-def _forces(
-    campaign: "Campaign",
-    file: "TireFile",
-    effect: "Effect",
-    catalogue: Mapping[str, "Effect"],
-    quantity: str | None,
-    remove: bool,
-    progress: Callable[[str], None],
-) -> tuple["TireFile", dict[str, Any]]:
-    from tirelib.diagnose.forces.assess import force_cases
-    from tirelib.extend.force_document import force_extended_file, force_extension_document
-    from tirelib.extend.force_extension import add_brush_effect, case_for, remove_brush_effect
-
-    case = case_for(force_cases(campaign, file, catalogue, quantity), effect)
-    step = remove_brush_effect if remove else add_brush_effect
-    done = step(case, effect, progress=progress)
-    new = force_extended_file(file, done, campaign.content_hash())
-    return new, force_extension_document(done, new)
-
-
-def _say(document: dict[str, Any], effect: "Effect") -> None:
+def _say(document: dict[str, Any]) -> None:
     from tirelib.report.explanation import unmoved
     from tirelib.report.page import unit_name
 
@@ -217,8 +192,8 @@ def _say(document: dict[str, Any], effect: "Effect") -> None:
     unit = unit_name(document["error_unit"])
     where = "" if document["quantity"] == "strain" else f", {document['quantity']}"
     console.print(
-        f"{document['campaign']}{where}: {document['action']} {effect.name}, strength "
-        f"{_numbers(document['strength'])} +- {_numbers(document['std'])} {effect.unit}"
+        f"{document['campaign']}{where}: {document['action']} {document['effect']}, strength "
+        f"{_numbers(document['strength'])} +- {_numbers(document['std'])} {document['unit']}"
     )
     console.print(
         f"  error {document['error_before']:.3g} -> {document['error_after']:.3g} [{unit}], "
@@ -231,7 +206,7 @@ def _say(document: dict[str, Any], effect: "Effect") -> None:
         )
     for line in unmoved(document):
         console.print(f"  {line}")
-    for line in (*_warnings(document["flags"], effect.low, effect.high), *document["messages"]):
+    for line in (*_warnings(document["flags"], *document["range"]), *document["messages"]):
         console.print(f"  {line}")
 
 

@@ -1,6 +1,7 @@
 """``tirelib compare``: where a model fails."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,6 +16,9 @@ from tirelib.cli.common import (
 from tirelib.cli.options import effects_option, json_option, model_option, quantity_option
 from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.errors import ParameterError
+
+if TYPE_CHECKING:
+    from tirelib.compare import Comparison, ForceComparison
 
 _EXAMPLE = """\b
 Examples:
@@ -75,7 +79,6 @@ def compare(
 ) -> None:
     """Compare a model with CAMPAIGN and show where it fails."""
     from tirelib.compare import compare as compare_model
-    from tirelib.compare.document import comparison_document
     from tirelib.model.registration import registered_effects
     from tirelib.parameters import read_tire
 
@@ -91,6 +94,18 @@ def compare(
             from tirelib.compare.plot_data import plot_data, write_plot_data
 
             data = plot_data(found, campaign, file, planted, catalogue, progress=progress)
+    write_told(found, out, json_file)
+    if data_file is not None:
+        write_plot_data(data_file, data)
+        output().print(f"written: {data_file}")
+
+
+def write_told(
+    found: "Comparison | ForceComparison", out: Path | None, json_file: Path | None
+) -> dict[str, Any]:
+    """Say a comparison, write its page and its numbers, and return these."""
+    from tirelib.compare.document import comparison_document
+
     document = comparison_document(found)
     console = output()
     console.print(_answer(document))
@@ -105,9 +120,7 @@ def compare(
     for path in targets:
         write_json(path, document)
         console.print(f"written: {path}")
-    if data_file is not None:
-        write_plot_data(data_file, data)
-        console.print(f"written: {data_file}")
+    return document
 
 
 def _trace(given: str) -> tuple[str, tuple[float, ...]]:

@@ -26,9 +26,10 @@ from tirelib.cli.options import (
 )
 from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.errors import TirelibError
-from tirelib.journey import explains_forces
 
 if TYPE_CHECKING:
+    from tirelib.diagnose.document import Assessment
+    from tirelib.diagnose.forces.assess import ForceAssessment
     from tirelib.effects import Effect
     from tirelib.parameters import TireFile
 
@@ -72,16 +73,27 @@ def diagnose(
     """Tell which physical effect the model lacks in CAMPAIGN."""
     from tirelib.model.registration import registered_effects
     from tirelib.parameters import read_tire
-    from tirelib.report.explanation import explained
 
     catalogue = registered_effects(effect_files)
     file = read_tire(model_name)
     campaign = read_campaign(folder)
     with progress_bar("diagnosing") as progress:
-        if explains_forces(quantity, campaign, file):
-            told, document = of_forces(campaign, file, catalogue, quantity, false_alarm, progress)
-        else:
-            told, document = _of_strain(campaign, file, catalogue, false_alarm, progress)
+        told, document = diagnosed(campaign, file, catalogue, quantity, false_alarm, progress)
+    write_told(told, document, model_name, folder, file, out, json_file)
+
+
+def write_told(
+    told: "Assessment | ForceAssessment",
+    document: dict[str, Any],
+    model_name: str,
+    folder: Path,
+    file: "TireFile",
+    out: Path | None,
+    json_file: Path | None,
+) -> None:
+    """Say a diagnosis of a model in four lines and more, and write its page and its numbers."""
+    from tirelib.report.explanation import explained
+
     explanation = explained(document, model_name, str(folder))
     document["explanation"] = asdict(explanation)
     _say(document, explanation.lines)
@@ -97,59 +109,35 @@ def diagnose(
         console.print(f"written: {path}")
 
 
-def _of_strain(
-    campaign: Campaign,
-    file: "TireFile",
-    catalogue: Mapping[str, "Effect"],
-    false_alarm: float,
-    progress: Callable[[str], None],
-) -> tuple[Any, dict[str, Any]]:
-    from tirelib.compare.model import model_of
-    from tirelib.diagnose.diagnose import diagnose as diagnose_model
-    from tirelib.diagnose.document import assess, diagnosis_document
-    from tirelib.identify.campaign_data import straight_runs
-    from tirelib.planning.document import next_test_document
-    from tirelib.waveforms import measure_waveforms
-
-    model = model_of(file, catalogue)
-    used = [each for each in model.used if each.effect.hook != "brush"]
-    runs = straight_runs(measure_waveforms(campaign, progress=progress))
-    found = diagnose_model(
-        runs,
-        model.values,
-        list(catalogue.values()),
-        effects=[each.effect for each in used],
-        strengths=[np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used],
-        false_alarm=false_alarm,
-        progress=progress,
-    )
-    told = assess(found, model, progress=progress)
-    document = diagnosis_document(told)
-    if document["verdict"] == "indistinguishable":
-        try:
-            document["next_test"] |= next_test_document(
-                document, found.verdict.hypotheses, catalogue, progress=progress
-            )
-        except TirelibError as error:
-            document["messages"].append(f"no next test: {error}")
-    return told, document
-
-
-def of_forces(
+def diagnosed(
     campaign: Campaign,
     file: "TireFile",
     catalogue: Mapping[str, "Effect"],
     quantity: str | None,
     false_alarm: float,
     progress: Callable[[str], None],
-) -> tuple[Any, dict[str, Any]]:
-    """Return a diagnosis of forces, and its document."""
-    from tirelib.diagnose.forces.assess import assess_forces, force_case
+) -> tuple["Assessment | ForceAssessment", dict[str, Any]]:
+    """Return a diagnosis, and its document with the run that parts what cannot be told apart."""
+    from tirelib.diagnose.document import Assessment, diagnosis_document
     from tirelib.diagnose.forces.document import force_diagnosis_document
+    from tirelib.journey import diagnose as diagnose_model
+    from tirelib.planning.document import next_test_document
 
-    case = force_case(campaign, file, catalogue, quantity)
-    told = assess_forces(case, list(catalogue.values()), false_alarm=false_alarm, progress=progress)
-    return told, force_diagnosis_document(told)
+    told = diagnose_model(
+        campaign, file, quantity, effects=catalogue, false_alarm=false_alarm, progress=progress
+    )
+    if not isinstance(told, Assessment):
+        return told, force_diagnosis_document(told)
+    document = diagnosis_document(told)
+    if document["verdict"] == "indistinguishable":
+        hypotheses = told.diagnosis.verdict.hypotheses
+        try:
+            document["next_test"] |= next_test_document(
+                document, hypotheses, catalogue, progress=progress
+            )
+        except TirelibError as error:
+            document["messages"].append(f"no next test: {error}")
+    return told, document
 
 
 def _say(document: dict[str, Any], lines: Sequence[tuple[str, str]]) -> None:

@@ -1,28 +1,35 @@
 """``tirelib explain``: the whole journey in one command, with one page."""
 
 import io
-import json
 import shlex
-from collections.abc import Mapping
-from contextlib import redirect_stdout
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from tirelib.campaign import read_campaign
+from tirelib.cli import compare as cli_compare
+from tirelib.cli import diagnose as cli_diagnose
+from tirelib.cli.add import write_step
 from tirelib.cli.common import (
     CAMPAIGN,
     NEW_FOLDER,
     output,
+    plain,
     write_json,
 )
 from tirelib.cli.options import effects_option, json_option, quantity_option
-from tirelib.cli.progress import chosen_words, progress_options
+from tirelib.cli.progress import chosen_words, progress_bar, progress_options
 from tirelib.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.journey import QUANTITIES, explains_forces
 
 if TYPE_CHECKING:
+    from tirelib.diagnose.document import Assessment
+    from tirelib.diagnose.forces.assess import ForceAssessment
+    from tirelib.effects import Effect
+    from tirelib.parameters import TireFile
     from tirelib.report.journey import Journey
 
 FORMAT = "tirelib-explanation/1"
@@ -83,9 +90,8 @@ def explain(
         raise ParameterError(
             f"--quantity {quantity}: allowed are {', '.join(QUANTITIES)}; correct the name"
         )
-    read_campaign(folder)  # what is wrong with it is said before anything is written
+    steps = Steps(folder, out, effect_files)  # faults of the campaign are said before files
     out.mkdir(parents=True, exist_ok=True)
-    steps = Steps(folder, out, tuple(str(path) for path in effect_files))
     journey = steps.walk(model_name, quantity)
     document = journey.document
     console = output()
@@ -111,12 +117,15 @@ class Steps:
         Of the campaign.
     out : Path
         Where models and pages go.
-    effect_files : tuple of str
+    effect_files : tuple of Path
     """
 
-    def __init__(self, folder: Path, out: Path, effect_files: tuple[str, ...]) -> None:
+    def __init__(self, folder: Path, out: Path, effect_files: tuple[Path, ...]) -> None:
+        from tirelib.model.registration import registered_effects
+
         self.folder, self.out = folder, out
-        self.effects = [word for path in effect_files for word in ("--effects", path)]
+        self.campaign, self.catalogue = read_campaign(folder), registered_effects(effect_files)
+        self.effects = [word for path in effect_files for word in ("--effects", str(path))]
         self.commands: list[str] = []
         self.messages: list[str] = []
 
@@ -128,130 +137,135 @@ class Steps:
         TirelibError
             Of any verb but `add`, whose reason becomes a message.
         """
+        from tirelib.journey import compare
+        from tirelib.parameters import read_tire
         from tirelib.report.journey import Journey
 
         model = model_name or self._identified()
-        about = self._about(model, quantity)
-        before = self._compared(model, about, "compared-before")
-        told = self._run(
-            "diagnose",
-            str(self.folder),
-            "--model",
-            model,
-            *about,
-            *self.effects,
-            "--out",
-            str(self.out / "diagnosed"),
-            json_name="diagnosis",
-        )
-        added: list[dict[str, Any]] = []
-        last = model
-        if told["verdict"] in ("named", "form_inadequate"):
-            for effect in told["named"]:
-                last, step = self._added(effect, last, about, len(added) + 2)
-                added += [step] if step is not None else []
-        after = self._compared(last, about, "compared-after") if added else before
-        document = self._document(told, before, after, added, model)
-        first = self._comparison(model, document["quantity"])
-        second = self._comparison(last, document["quantity"]) if added else first
-        return Journey(first, second, document, added, _history(last))
+        file = read_tire(model)
+        quantity = self._settled(file, quantity)
+        about = () if quantity is None else ("--quantity", quantity)
+
+        def compared(model: str, name: str) -> tuple[Any, dict[str, Any]]:
+            page = self.out / name
+            words = (str(self.folder), "--model", model, *about, *self.effects)
+            with self._step("compare", *words, "--out", str(page), json_name=name):
+                with progress_bar("comparing") as progress:
+                    found = compare(
+                        self.campaign,
+                        read_tire(model),
+                        quantity,
+                        effects=self.catalogue,
+                        progress=progress,
+                    )
+                document = cli_compare.write_told(found, page, self.out / f"{name}.json")
+            return found, dict(plain(document))
+
+        first, before = compared(model, "compared-before")
+        told, diagnosis = self._diagnosed(file, model, quantity, about)
+        named = diagnosis["verdict"] in ("named", "form_inadequate")
+        added = list(self._added(told, file, model, about)) if named else []
+        last = added[-1]["model"] if added else model
+        second, after = compared(last, "compared-after") if added else (first, before)
+        document = self._document(diagnosis, before, after, added, model)
+        history = list(read_tire(last).extra.get("history", []))
+        return Journey(first, second, document, added, history)
+
+    def _diagnosed(
+        self, file: "TireFile", model: str, quantity: str | None, about: tuple[str, ...]
+    ) -> tuple["Assessment | ForceAssessment", dict[str, Any]]:
+        from tirelib.diagnose.diagnose import FALSE_ALARM
+
+        page = self.out / "diagnosed"
+        words = (str(self.folder), "--model", model, *about, *self.effects)
+        with self._step("diagnose", *words, "--out", str(page), json_name="diagnosis"):
+            with progress_bar("diagnosing") as progress:
+                told, document = cli_diagnose.diagnosed(
+                    self.campaign, file, self.catalogue, quantity, FALSE_ALARM, progress
+                )
+            target = self.out / "diagnosis.json"
+            cli_diagnose.write_told(told, document, model, self.folder, file, page, target)
+        return told, dict(plain(document))
 
     def _identified(self) -> str:
-        model = str(self.out / "M.toml")
-        self._run("identify", str(self.folder), "--out", model, json_name="identification")
-        return model
-
-    def _about(self, model: str, quantity: str | None) -> tuple[str, ...]:
-        """Return the option that names the quantity; of forces it is settled once for all steps."""
-        from tirelib.diagnose.forces.assess import force_case
-        from tirelib.model.registration import registered_effects
-        from tirelib.parameters import read_tire
-
-        campaign, file = read_campaign(self.folder), read_tire(model)
-        if not explains_forces(quantity, campaign, file):
-            return ("--quantity", "strain") if quantity is not None else ()
-        paths = tuple(Path(word) for word in self.effects[1::2])
-        case = force_case(campaign, file, registered_effects(paths), quantity)
-        return ("--quantity", case.quantity)
-
-    def _compared(self, model: str, about: tuple[str, ...], name: str) -> dict[str, Any]:
-        return self._run(
-            "compare",
-            str(self.folder),
-            "--model",
-            model,
-            *about,
-            *self.effects,
-            "--out",
-            str(self.out / name),
-            json_name=name,
-        )
-
-    def _added(
-        self, effect: str, model: str, about: tuple[str, ...], number: int
-    ) -> tuple[str, dict[str, Any] | None]:
-        """Return the model with one effect more; as it was, with a message, if that fails."""
-        target = str(self.out / f"M{number}.toml")
-        try:
-            step = self._run(
-                "add",
-                effect,
-                "--model",
-                model,
-                "--data",
-                str(self.folder),
-                *about,
-                *self.effects,
-                "--out",
-                target,
-                "--report",
-                str(self.out / f"added-{effect}"),
-                json_name=f"added-{effect}",
-            )
-        except TirelibError as error:
-            self.messages.append(f"{effect} is named but could not be added: {error}")
-            return model, None
-        return target, step | {"model": target}
-
-    def _run(self, *words: str, json_name: str) -> dict[str, Any]:
-        """Run a verb as the command line would, and return the document that it wrote.
+        """Identify the model as the verb does, and return its file's name.
 
         Raises
         ------
         CalibrationError
-            If it ends without success for another reason than bad input, with what it said.
+            If that ends without success, with what it said.
         """
         from tirelib.cli import program
 
-        target = self.out / f"{json_name}.json"
-        arguments = [*words, "--json", str(target)]
-        self.commands.append(shlex.join(["tirelib", *arguments]))
-        progress = chosen_words()
-        if "--quiet" not in progress:
-            click.echo(f"step {len(self.commands)}: {STEPS[words[0]]}", err=True)
-        said = io.StringIO()
-        with redirect_stdout(said):
-            code = program.main([*arguments, *progress], prog_name="tirelib", standalone_mode=False)
+        model = str(self.out / "M.toml")
+        words = ["identify", str(self.folder), "--out", model]
+        target = self.out / "identification.json"
+        with self._step(*words, json_name="identification") as said:
+            code = program.main(
+                [*words, "--json", str(target), *chosen_words()],
+                prog_name="tirelib",
+                standalone_mode=False,
+            )
         if code:
             raise CalibrationError(
                 f"{shlex.join(['tirelib', *words])}: it ended with exit code {code}: "
                 f"{said.getvalue().strip()}"
             )
-        document = json.loads(target.read_text(encoding="utf-8"))
-        return dict(document)
+        return model
 
-    def _comparison(self, model: str, quantity: str) -> Any:
-        from tirelib.compare import compare
-        from tirelib.model.registration import registered_effects
-        from tirelib.parameters import read_tire
+    def _settled(self, file: "TireFile", quantity: str | None) -> str | None:
+        """Return the quantity; of forces it is settled once for all steps."""
+        from tirelib.diagnose.forces.assess import force_case
 
-        paths = tuple(Path(word) for word in self.effects[1::2])
-        return compare(
-            read_campaign(self.folder),
-            read_tire(model),
-            quantity,
-            effects=registered_effects(paths),
+        if not explains_forces(quantity, self.campaign, file):
+            return quantity
+        return force_case(self.campaign, file, self.catalogue, quantity).quantity
+
+    def _added(
+        self,
+        told: "Assessment | ForceAssessment",
+        file: "TireFile",
+        model: str,
+        about: tuple[str, ...],
+    ) -> Iterator[dict[str, Any]]:
+        """Yield the step to the model with each named effect more, by the diagnosis' fits.
+
+        An effect that cannot be added is left out, with a message.
+        """
+        from tirelib.extend.additions import additions
+
+        def failed(effect: "Effect", error: TirelibError) -> None:
+            self.messages.append(f"{effect.name} is named but could not be added: {error}")
+
+        steps = additions(
+            [self.catalogue[name] for name in told.named],
+            file,
+            self.campaign,
+            None,
+            self.catalogue,
+            diagnosis=told,
+            failed=failed,
         )
+        names: list[str] = []
+        for new, document in steps:
+            name = document["effect"]
+            names.append(name)
+            target, page = self.out / f"M{len(names) + 1}.toml", self.out / f"added-{name}"
+            words = (*names, "--model", model, "--data", str(self.folder), *about, *self.effects)
+            files = ("--out", str(target), "--report", str(page))
+            with self._step("add", *words, *files, json_name=page.name):
+                write_step(new, document, target, page, self.out / f"{page.name}.json")
+            yield dict(plain(document)) | {"model": str(target)}
+
+    @contextmanager
+    def _step(self, *words: str, json_name: str) -> Iterator[io.StringIO]:
+        """Note the command of a step that is done here, and catch what it says."""
+        target = self.out / f"{json_name}.json"
+        self.commands.append(shlex.join(["tirelib", *words, "--json", str(target)]))
+        if "--quiet" not in chosen_words():
+            click.echo(f"step {len(self.commands)}: {STEPS[words[0]]}", err=True)
+        with redirect_stdout(io.StringIO()) as said:
+            yield said
 
     def _document(
         self,
@@ -343,9 +357,3 @@ def _unmoved(added: list[dict[str, Any]]) -> list[str]:
     from tirelib.report.explanation import unmoved
 
     return [f"{step['effect']}: {said}" for step in added for said in unmoved(step)]
-
-
-def _history(model: str) -> list[Mapping[str, Any]]:
-    from tirelib.parameters import read_tire
-
-    return list(read_tire(model).extra.get("history", []))

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
@@ -17,7 +16,7 @@ from tirelib.cli.common import (
     output,
     write_json,
 )
-from tirelib.cli.diagnose import of_forces
+from tirelib.cli.diagnose import diagnosed
 from tirelib.cli.options import (
     effects_option,
     false_alarm_option,
@@ -175,9 +174,7 @@ def next_test(
             "--quantity Fy"
         )
     model = model_of(file, catalogue)
-    used = [each for each in model.used if each.effect.hook != "brush"]
-    effects = [each.effect for each in used]
-    strengths = [np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used]
+    effects, strengths = model.of_strain
     told = _read_diagnosis(diagnosis_file, "strain") if diagnosis_file is not None else None
     suspects = None
     if names is not None:
@@ -205,7 +202,7 @@ def next_test(
                 false_alarm=false_alarm,
                 progress=progress,
             )
-            told = diagnosis_document(assess(found, model, progress=progress))
+            told = diagnosis_document(assess(found, model))
             suspects, hypotheses = suspects_of(told, catalogue), found.verdict.hypotheses
         elif suspects.effects:
             problem = StrainProblem(
@@ -250,7 +247,7 @@ def _for_force(
             told = _read_diagnosis(diagnosis_file, quantity)
             quantity = str(told["quantity"])
         elif names is None:
-            _, told = of_forces(campaign, file, catalogue, quantity, false_alarm, progress)
+            _, told = diagnosed(campaign, file, catalogue, quantity, false_alarm, progress)
             quantity = told["quantity"]
         case = force_case(campaign, file, catalogue, quantity)
         has = [effect.name for effect in case.effects]

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
@@ -93,8 +92,8 @@ def selftest(
 
     catalogue = registered_effects(effect_files)
     model = model_of(read_tire(model_name), catalogue)
-    used = [each for each in model.used if each.effect.hook != "brush"]
-    only = _only(names, [each.effect.name for each in used], catalogue)
+    has, strengths = model.of_strain
+    only = _only(names, [effect.name for effect in has], catalogue)
     campaign = read_campaign(folder)
     with progress_bar("planting") as progress:
         runs = straight_runs(measure_waveforms(campaign, progress=progress))
@@ -102,8 +101,8 @@ def selftest(
             runs,
             model.values,
             list(catalogue.values()),
-            effects=[each.effect for each in used],
-            strengths=[np.atleast_1d(np.asarray(each.strength, dtype=float)) for each in used],
+            effects=has,
+            strengths=strengths,
             only=only,
             ratios=tuple(dict.fromkeys(ratios)),
             repeats=repeats,

@@ -30,6 +30,11 @@ class UsedEffect:
     effect: Effect
     strength: float | tuple[float, ...]
 
+    @property
+    def components(self) -> FloatArray:
+        """The strength as an array, shape (components,)."""
+        return np.atleast_1d(np.asarray(self.strength, dtype=float))
+
 
 @dataclass(frozen=True, slots=True)
 class Model:
@@ -79,6 +84,12 @@ class Model:
         """What the effects change in the chain from tire to waveform."""
         pairs = [used.effect.at(used.strength) for used in self.used]
         return [(stage, change) for stage, change in pairs if stage != "brush"]
+
+    @property
+    def of_strain(self) -> tuple[list[Effect], list[FloatArray]]:
+        """Effects that strain shows, and their strengths, one array of components each."""
+        used = [each for each in self.used if each.effect.hook != "brush"]
+        return [each.effect for each in used], [each.components for each in used]
 
     @property
     def across(self) -> bool:

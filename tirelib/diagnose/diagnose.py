@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.compare.error import Yardstick
-from tirelib.diagnose.fitted import Fitted, fitted
+from tirelib.diagnose.fitted import Fitted
 from tirelib.diagnose.guess import Guess, guess_law
+from tirelib.diagnose.strain_models import StrainModels
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.span import span
@@ -76,11 +76,10 @@ class Diagnosis:
         Effects of the smallest members of the confidence set, best first.
     findings : tuple of Finding
         By rank.
-    dead : mapping of name to reason
+    models : StrainModels
+        Everything that was fitted.
     base, final : Fitted
         Without further effects and with those of the best member.
-    problem : StrainProblem
-    yardstick : Yardstick
     beyond : shape (n_runs, n_phi) or None
         Whitened part of model less measured that neither the best member nor plain tires explain;
         None where a member of the set is right.
@@ -91,18 +90,26 @@ class Diagnosis:
     verdict: Verdict
     named: tuple[str, ...]
     findings: tuple[Finding, ...]
-    dead: Mapping[str, str]
+    models: StrainModels
     base: Fitted
     final: Fitted
-    problem: StrainProblem
-    yardstick: Yardstick
     beyond: FloatArray | None
     guess: Guess | None
+
+    @property
+    def problem(self) -> StrainProblem:
+        """The problem, its whitening about the model without further effects."""
+        return self.models.problem
 
     @property
     def runs(self) -> StraightRuns:
         """The straight runs."""
         return self.problem.runs
+
+    @property
+    def dead(self) -> Mapping[str, str]:
+        """Effects that the plan cannot show, with the reason."""
+        return self.problem.dead
 
     @property
     def exceeds(self) -> bool:
@@ -148,12 +155,9 @@ def diagnose(
     """
     given = StrainProblem(runs, values, catalogue, effects, strengths)
     verdict = select(given, plain_tires(), false_alarm=false_alarm, progress=progress)
-    problem = verdict.hypotheses.problem
-    assert isinstance(problem, StrainProblem)  # noqa: S101 - as the given one
-    yardstick, best = Yardstick.of(runs), verdict.best
-    base = final = fitted(verdict.hypotheses, verdict.base, yardstick)
-    if best is not verdict.base:
-        final = fitted(verdict.hypotheses, best, yardstick)
+    models, best = StrainModels(verdict.hypotheses, progress), verdict.best
+    problem, base = models.problem, models.at()
+    final = models.at(verdict.hypotheses.added(best))
     beyond, guess = None, None
     if verdict.kind in ("unknown", "form_inadequate"):
         reached = final.reached
@@ -169,11 +173,9 @@ def diagnose(
         verdict,
         tuple(dict.fromkeys(name for names in verdict.sets for name in names)),
         findings_of(verdict, problem, base.reached.rest, base.reached.white_of),
-        problem.dead,
+        models,
         base,
         final,
-        problem,
-        yardstick,
         beyond,
         guess,
     )

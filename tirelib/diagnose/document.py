@@ -1,8 +1,7 @@
 """A diagnosis with what its reader needs: floor, held-out errors, what is left; as JSON."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,14 +9,13 @@ import numpy as np
 from tirelib.compare.error import ModelError, named_errors
 from tirelib.compare.model import Model
 from tirelib.diagnose.diagnose import Diagnosis, Finding
-from tirelib.diagnose.fitted import Fitted, fitted, least_error
+from tirelib.diagnose.fitted import Fitted
 from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.guess import Guess
-from tirelib.diagnose.held_out import Fold, fold_entry, folds, held_out_errors, pooled
+from tirelib.diagnose.held_out import Fold, fold_entry, pooled
 from tirelib.diagnose.left import Left, left_of, told_powers
 from tirelib.diagnose.told import candidate_told, verdict_told
 from tirelib.errors import TirelibError
-from tirelib.forked import forked
 
 FORMAT = "tirelib-diagnosis/1"
 NO_REPEATS = (
@@ -32,6 +30,8 @@ class Assessment:
 
     Attributes
     ----------
+    given : Model
+        The model that was diagnosed, as its file has it.
     diagnosis : Diagnosis
     verdict : str
     named : tuple of str
@@ -44,17 +44,15 @@ class Assessment:
     floor : float
         Part of `after` that noise and what plain tires show explain.
     folds : tuple of Fold
-    held_before : tuple of float
-        One error per fold, of the model without the named effects; empty if nothing is named.
-    held_after : mapping of name to tuple of float
-        With one named effect alone.
-    held_final : tuple of float
-        With all named effects; empty if nothing is named.
+        Empty if nothing is named.
+    singles : mapping of name to Fitted
+        The model with one named effect alone, where that can be fitted.
     left : Left
         What no effect explains.
     messages : tuple of str
     """
 
+    given: Model
     diagnosis: Diagnosis
     verdict: str
     named: tuple[str, ...]
@@ -64,9 +62,7 @@ class Assessment:
     after: ModelError
     floor: float
     folds: tuple[Fold, ...]
-    held_before: tuple[float, ...]
-    held_after: dict[str, tuple[float, ...]]
-    held_final: tuple[float, ...]
+    singles: Mapping[str, Fitted]
     left: Left
     messages: tuple[str, ...]
 
@@ -75,6 +71,10 @@ class Assessment:
         """The model with the named effects."""
         return self.diagnosis.final if self.named else self.diagnosis.base
 
+    def held_out(self, fit: Fitted | None) -> tuple[float, ...]:
+        """Return the errors of a model on each fold's runs; none without folds, or a model."""
+        return self.diagnosis.models.held_out(fit) if self.folds and fit is not None else ()
+
     def error_with(self, finding: Finding) -> float:
         """Return the error with one effect alone, to first order unless it is the one named."""
         if self.named == (finding.effect.name,):
@@ -82,9 +82,7 @@ class Assessment:
         return self.refitted.value * float(np.sqrt(max(1.0 - finding.share, 0.0)))
 
 
-def assess(
-    found: Diagnosis, given: Model, *, progress: Callable[[str], None] | None = None
-) -> Assessment:
+def assess(found: Diagnosis, given: Model) -> Assessment:
     """Return a diagnosis with floor, held-out errors and what is left.
 
     Parameters
@@ -92,11 +90,10 @@ def assess(
     found : Diagnosis
     given : Model
         The model that was diagnosed, as its file has it.
-    progress : callable, optional
     """
-    yardstick = found.yardstick
+    models = found.models
     verdict, named, findings, messages = found.verdict.kind, found.named, found.findings, []
-    before, refitted = least_error(found.base, given, yardstick)
+    before, refitted = models.least_error(found.base, given)
     if not refitted.known:
         verdict, named = "none", ()
         findings = tuple(_hint(finding) for finding in findings)
@@ -104,17 +101,10 @@ def assess(
     final = found.final if named else found.base
     after = final.reached if named else refitted
     floor = floor_of(after, found.verdict.best, found.verdict.alpha)
-    chosen = folds(found.problem.data) if named else ()
-
-    if progress is not None and chosen:
-        progress("fits without some of the runs")
-    singles = {name: single for name in named if (single := _with_one(found, name)) is not None}
-    models = [found.base, *singles.values()]
-    if len(named) > 1 or (named and not singles):
-        models.append(final)
-    held = forked([partial(held_out_errors, model, chosen, yardstick) for model in models])
-    held_before, held_final = held[0], held[-1]
-    held_after = dict(zip(singles, held[1:], strict=False))
+    chosen = models.folds if named else ()
+    singles = {name: one for name in named if (one := _with_one(found, name)) is not None}
+    if chosen:
+        models.left_out(found.base, *singles.values(), final)
     if named and not chosen:
         messages.append(
             "nothing can be held out: three loads or two pressures, and four other runs, are needed"
@@ -125,6 +115,7 @@ def assess(
         if finding.effect.name in named and not finding.in_range
     ]
     return Assessment(
+        given,
         found,
         verdict,
         named,
@@ -134,9 +125,7 @@ def assess(
         after,
         floor,
         chosen,
-        held_before,
-        held_after,
-        held_final,
+        singles,
         _left(found, final),
         tuple(messages),
     )
@@ -158,13 +147,8 @@ def _hint(finding: Finding) -> Finding:
 
 def _with_one(found: Diagnosis, name: str) -> Fitted | None:
     """Return the base model with one effect fitted, or None if that fails."""
-    if found.verdict.hypotheses.added(found.verdict.best) == (name,):
-        return found.final
-    alone = found.verdict.hypotheses.at((name,))
-    if alone is None:
-        return None
     try:
-        return fitted(found.verdict.hypotheses, alone, found.yardstick)
+        return found.models.at((name,))
     except TirelibError:
         return None
 
@@ -172,6 +156,7 @@ def _with_one(found: Diagnosis, name: str) -> Fitted | None:
 def diagnosis_document(told: Assessment) -> dict[str, Any]:
     """Return the numbers as ``tirelib-diagnosis/1``; strains in microstrain, angles in deg."""
     found = told.diagnosis
+    held_before, held_final = told.held_out(found.base), told.held_out(told.final)
     return {
         "format": FORMAT,
         "campaign": found.runs.waves.header.name,
@@ -182,13 +167,11 @@ def diagnosis_document(told: Assessment) -> dict[str, Any]:
         "error_refitted": told.refitted.value,
         "repeats": found.runs.noise.repeats,
         "floor": told.floor,
-        "heldout_error_before": pooled(told.held_before, told.folds),
-        "heldout_error_after": pooled(told.held_final, told.folds),
+        "heldout_error_before": pooled(held_before, told.folds),
+        "heldout_error_after": pooled(held_final, told.folds),
         "held_out": [
             fold_entry(fold, before, after)
-            for fold, before, after in zip(
-                told.folds, told.held_before, told.held_final, strict=True
-            )
+            for fold, before, after in zip(told.folds, held_before, held_final, strict=True)
         ],
         "delay_us": 1e6 * told.after.delay,
         "verdict": told.verdict,
@@ -201,7 +184,7 @@ def diagnosis_document(told: Assessment) -> dict[str, Any]:
                 finding,
                 rank,
                 told.error_with(finding),
-                pooled(told.held_after.get(finding.effect.name, ()), told.folds),
+                pooled(told.held_out(told.singles.get(finding.effect.name)), told.folds),
             )
             for rank, finding in enumerate(told.findings, start=1)
         ],

@@ -48,17 +48,6 @@ def folds(data: Data) -> tuple[Fold, ...]:
     return tuple(found)
 
 
-def held_out_errors(
-    model: Fitted, chosen: Sequence[Fold], yardstick: Yardstick
-) -> tuple[float, ...]:
-    """Return a model's error on each fold's runs after a fit to the other runs.
-
-    Parameters as of `held_out`; NaN where the fit does not settle or the model fails there.
-    """
-    found = held_out(model, chosen, yardstick)
-    return tuple(float("nan") if error is None else error.value for error in found)
-
-
 def held_out(
     model: Fitted, chosen: Sequence[Fold], yardstick: Yardstick
 ) -> tuple[ModelError | None, ...]:
@@ -83,6 +72,11 @@ def held_out(
         except TirelibError:
             errors.append(None)
     return tuple(errors)
+
+
+def values_of_errors(errors: Sequence[ModelError | None]) -> tuple[float, ...]:
+    """Return the values of errors, NaN for none."""
+    return tuple(float("nan") if error is None else error.value for error in errors)
 
 
 def fold_entry(fold: Fold, before: float, after: float) -> dict[str, Any]:

@@ -45,10 +45,10 @@ def _errors(done: ForceExtension) -> dict[str, float]:
     """Return the errors of a step as they are told."""
     case = done.case
     return {
-        "error_before": case.given,
+        "error_before": done.given,
         "error_refitted": case.error(done.before),
         "error_after": case.error(done.after),
-        "floor": done.floor,
+        "floor": case.told(done.floor, done.after),
         "heldout_error_before": case.factor * pooled(done.held_before, done.folds),
         "heldout_error_after": case.factor * pooled(done.held_after, done.folds),
     }

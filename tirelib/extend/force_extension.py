@@ -1,21 +1,19 @@
 """One brush effect more or less: the brush fitted to one force, judged on points left out."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from tirelib.arrays import FloatArray
 from tirelib.diagnose.diagnose import FALSE_ALARM
 from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.diagnose import plain_tires
-from tirelib.diagnose.forces.fit import ForceFit, fit_force, with_effect
-from tirelib.diagnose.forces.floor import force_floor
-from tirelib.diagnose.forces.held_out import ForceFold, errors_of, force_folds
+from tirelib.diagnose.forces.fit import ForceFit
+from tirelib.diagnose.forces.models import ForceModels
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.errors import ParameterError, TirelibError
-from tirelib.extend.step import Step, added, removed
+from tirelib.extend.step import Step, added, kept, refuse_second, removed
 from tirelib.infer.forces import ForceProblem
-from tirelib.infer.select import Hypotheses
 from tirelib.threads import one_thread
 
 
@@ -26,9 +24,12 @@ class ForceExtension(Step[ForceFit]):
     Attributes
     ----------
     case : ForceCase
+    given : float
+        Error of the model before the step as it was given, in the unit in which errors are told.
     """
 
     case: ForceCase
+    given: float
 
 
 @one_thread()
@@ -56,9 +57,29 @@ def add_brush_effect(
     ConvergenceError
         If a fit does not settle.
     """
-    return ForceExtension(**vars(added(_Force(case, progress), effect)), case=case)
+    refuse_brush(case, effect)
+    return extended_brush(force_models(case, [effect], progress), case, effect)
 
 
+@one_thread()
+def extended_brush(
+    models: ForceModels, case: ForceCase, effect: Effect, before: ForceFit | None = None
+) -> ForceExtension:
+    """Return a brush with one effect more, from models about it; errors as of `add_brush_effect`.
+
+    Parameters
+    ----------
+    models : ForceModels
+    case : ForceCase
+    effect : Effect
+    before : ForceFit, optional
+        One of the models, with effects that were added before.
+    """
+    given = case.given if before is None else case.error(before)
+    return ForceExtension(**vars(added(models, effect, before)), case=case, given=given)
+
+
+@one_thread()
 def remove_brush_effect(
     case: ForceCase,
     effect: Effect,
@@ -69,7 +90,63 @@ def remove_brush_effect(
 
     Parameters and errors as for `add_brush_effect`.
     """
-    return ForceExtension(**vars(removed(_Force(case, progress), effect)), case=case)
+    places = kept(case.model.name, case.effects, effect, "the brush")
+    models = force_models(case, [effect], progress)
+    before = models.at()
+    others = _about(
+        case,
+        before.values,
+        [before.effects[k] for k in places],
+        [before.strengths[k] for k in places],
+        [effect],
+        progress,
+    )
+    step = removed(models, effect, others)
+    return ForceExtension(**vars(step), case=case, given=case.given)
+
+
+def force_models(
+    case: ForceCase,
+    more: Sequence[Effect] = (),
+    progress: Callable[[str], None] | None = None,
+) -> ForceModels:
+    """Return models about the brush of a case; `more` effects may be the user's own."""
+    return _about(case, case.model.values, case.effects, case.strengths, more, progress)
+
+
+def _about(
+    case: ForceCase,
+    values: Mapping[str, float],
+    effects: Sequence[Effect],
+    strengths: Sequence[FloatArray],
+    more: Sequence[Effect],
+    progress: Callable[[str], None] | None,
+) -> ForceModels:
+    catalogue = [*CATALOGUE.values(), *(each for each in more if each.name not in CATALOGUE)]
+    given = ForceProblem(
+        case.problem.bench,
+        case.quantity,
+        values,
+        catalogue,
+        noise=case.noise,
+        effects=effects,
+        strengths=strengths,
+    )
+    return ForceModels(case.problem, given, FALSE_ALARM, progress=progress)
+
+
+def refuse_brush(case: ForceCase, effect: Effect) -> None:
+    """Raise ParameterError if a model has an effect, or it does not act on the brush."""
+    _refuse_of_strain(case, effect)
+    refuse_second(case.model.name, case.effects, effect)
+
+
+def _refuse_of_strain(case: ForceCase, effect: Effect) -> None:
+    if effect.hook != "brush":
+        raise ParameterError(
+            f"effect {effect.name!r} acts on strain, which forces do not show; leave "
+            f"--quantity {case.quantity} out, or choose an effect of the brush"
+        )
 
 
 def case_for(cases: Sequence[ForceCase], effect: Effect) -> ForceCase:
@@ -91,92 +168,14 @@ def case_for(cases: Sequence[ForceCase], effect: Effect) -> ForceCase:
     for case in cases:
         if effect.name in {each.name for each in case.effects}:
             return case
-        subject = _Force(case, None)
-        subject.refuse(effect)
+        _refuse_of_strain(case, effect)
         try:
-            before = subject.fitted()
-            if subject.dead(before, effect):
+            models = force_models(case, [effect])
+            if models.dead(effect):
                 continue
-            ratio = subject.with_effect(before, effect).error / before.error
+            ratio = models.with_effect(models.at(), effect).error / models.at().error
         except TirelibError:
             continue
         if ratio < lowest:
             best, lowest = case, ratio
     return best
-
-
-class _Force:
-    """A brush on one force (`tirelib.extend.step.Subject`)."""
-
-    acts_on = "the brush"
-
-    def __init__(self, case: ForceCase, progress: Callable[[str], None] | None) -> None:
-        self.case, self.progress = case, progress
-        self.name = case.model.name
-
-    @property
-    def effects(self) -> list[Effect]:
-        """That the model has."""
-        return self.case.effects
-
-    def refuse(self, effect: Effect) -> None:
-        """Raise ParameterError if an effect does not act on the brush."""
-        if effect.hook != "brush":
-            raise ParameterError(
-                f"effect {effect.name!r} acts on strain, which forces do not show; leave "
-                f"--quantity {self.case.quantity} out, or choose an effect of the brush"
-            )
-
-    def fitted(self) -> ForceFit:
-        """Return the brush as it is, fitted."""
-        case = self.case
-        return fit_force(case.problem, case.model.values, case.effects, case.strengths)
-
-    def dead(self, before: ForceFit, effect: Effect) -> str:
-        """Return why the points cannot show an effect, or an empty text."""
-        return self._problem(before, [effect]).dead.get(effect.name, "")
-
-    def with_effect(self, before: ForceFit, effect: Effect) -> ForceFit:
-        """Return the fit with one effect more."""
-        return with_effect(self.case.problem, before, effect)
-
-    def without(self, before: ForceFit, kept: Sequence[int]) -> ForceFit:
-        """Return the fit with some of the effects."""
-        return fit_force(
-            self.case.problem,
-            before.values,
-            [before.effects[k] for k in kept],
-            [before.strengths[k] for k in kept],
-        )
-
-    def left_out(self) -> Sequence[ForceFold]:
-        """Return the points that are left out in turn."""
-        return force_folds(self.case.problem)
-
-    def held_out(self, fit: ForceFit, folds: Sequence[ForceFold]) -> tuple[float, ...]:
-        """Return the errors on left-out points."""
-        if self.progress is not None:
-            self.progress("held-out points")
-        return errors_of(self.case.problem, fit, folds)
-
-    def floor(self, after: ForceFit) -> float:
-        """Return the part of the error that noise and plain tires explain, as errors are told."""
-        case = self.case
-        if not np.isfinite(case.noise):
-            return float("nan")
-        problem = self._problem(after, list(CATALOGUE.values()))
-        among = Hypotheses(problem, plain_tires(case.quantity))
-        floor = force_floor(case.problem, after, among.base, FALSE_ALARM)
-        return case.error(after) * floor / after.error
-
-    def _problem(self, fit: ForceFit, catalogue: Sequence[Effect]) -> ForceProblem:
-        """Return the problem about a fitted brush."""
-        return ForceProblem(
-            self.case.problem.bench,
-            self.case.quantity,
-            fit.values,
-            catalogue,
-            noise=self.case.noise,
-            effects=fit.effects,
-            strengths=fit.strengths,
-        )

@@ -1,7 +1,7 @@
 """One effect more or less, for strain and for forces: fit, fit again, judge on what is left out.
 
 What differs is how a model is fitted to its campaign, what its floor is and what can be left out:
-a `Subject` says it.
+`Models` say it.
 """
 
 from collections.abc import Sequence
@@ -40,46 +40,26 @@ class Fit(Protocol):
 F = TypeVar("F", bound=Fit)
 
 
-class Subject(Protocol[F]):
-    """A model on a campaign.
-
-    Attributes
-    ----------
-    name : str
-        Of the model.
-    acts_on : str
-        What its effects act on, in words.
-    """
-
-    name: str
-    acts_on: str
+class Models(Protocol[F]):
+    """A model on a campaign, and others about it, each fitted once."""
 
     @property
-    def effects(self) -> Sequence[Effect]:
-        """That the model has, of this kind."""
+    def folds(self) -> Sequence[Any]:
+        """What can be left out of a fit in turn."""
 
-    def refuse(self, effect: Effect) -> None:
-        """Raise ParameterError if an effect cannot act here."""
-
-    def fitted(self) -> F:
+    def at(self) -> F:
         """Return the model as it is, fitted."""
 
-    def dead(self, before: F, effect: Effect) -> str:
+    def dead(self, effect: Effect) -> str:
         """Return why the campaign cannot show an effect, or an empty text."""
 
     def with_effect(self, before: F, effect: Effect) -> F:
         """Return the fit with one effect more."""
 
-    def without(self, before: F, kept: Sequence[int]) -> F:
-        """Return the fit with some of the effects."""
-
-    def left_out(self) -> Sequence[Any]:
-        """Return what is left out in turn."""
-
-    def held_out(self, fit: F, folds: Sequence[Any]) -> tuple[float, ...]:
+    def held_out(self, fit: F) -> tuple[float, ...]:
         """Return the errors on what is left out."""
 
-    def floor(self, after: F) -> float:
+    def floor(self, fit: F) -> float:
         """Return the error that structure leaves."""
 
 
@@ -118,74 +98,79 @@ class Step(Generic[F]):
     flags: tuple[str, ...]
 
 
-def added(subject: Subject[F], effect: Effect) -> Step[F]:
+def added(models: Models[F], effect: Effect, before: F | None = None) -> Step[F]:
     """Return a model with one effect more, everything fitted anew.
+
+    Parameters
+    ----------
+    models : Models
+    effect : Effect
+    before : Fit, optional
+        One of the models, with effects that were added before; the one without by default.
 
     Raises
     ------
-    ParameterError
-        If the model has the effect already, or it cannot act here.
     CalibrationError
         If the campaign cannot show it.
     ConvergenceError
         If a fit does not settle.
     """
-    subject.refuse(effect)
-    refuse_second(subject, effect)
-    before = subject.fitted()
-    if reason := subject.dead(before, effect):
+    if reason := models.dead(effect):
         raise CalibrationError(
             f"effect {effect.name!r}: this campaign cannot show it: {reason}; measure such runs, "
             "or leave the effect out"
         )
-    after = subject.with_effect(before, effect)
-    return _judged(subject, "add", effect, before, after, after)
+    first = before or models.at()
+    after = models.with_effect(first, effect)
+    return _judged("add", effect, models, first, models, after)
 
 
-def removed(subject: Subject[F], effect: Effect) -> Step[F]:
-    """Return a model without one of its effects; the rest is fitted anew.
+def removed(models: Models[F], effect: Effect, fewer: Models[F]) -> Step[F]:
+    """Return a model without one of its effects, which others are about; the rest fitted anew.
+
+    Raises
+    ------
+    ConvergenceError
+        If a fit does not settle.
+    """
+    return _judged("remove", effect, models, models.at(), fewer, fewer.at())
+
+
+def refuse_second(name: str, has: Sequence[Effect], effect: Effect) -> None:
+    """Raise ParameterError if a model, by its name, has an effect already."""
+    if effect.name in {each.name for each in has}:
+        raise ParameterError(
+            f"{name}: it has the effect {effect.name!r} already; choose another one, or take it "
+            "out first with --remove"
+        )
+
+
+def kept(name: str, has: Sequence[Effect], effect: Effect, acts_on: str) -> list[int]:
+    """Return the places of the effects that stay where one is removed.
 
     Raises
     ------
     ParameterError
         If the model does not have the effect.
-    ConvergenceError
-        If a fit does not settle.
     """
-    names = [each.name for each in subject.effects]
+    names = [each.name for each in has]
     if effect.name not in names:
         raise ParameterError(
-            f"{subject.name}: it has no effect {effect.name!r} of {subject.acts_on} to remove; it "
-            f"has {', '.join(names) or 'none'}"
+            f"{name}: it has no effect {effect.name!r} of {acts_on} to remove; it has "
+            f"{', '.join(names) or 'none'}"
         )
-    before = subject.fitted()
-    after = subject.without(before, [k for k, name in enumerate(names) if name != effect.name])
-    return _judged(subject, "remove", effect, before, after, before)
-
-
-def refuse_second(subject: Subject[F], effect: Effect) -> None:
-    """Refuse an effect that the model has.
-
-    Raises
-    ------
-    ParameterError
-        If it has.
-    """
-    if effect.name in {each.name for each in subject.effects}:
-        raise ParameterError(
-            f"{subject.name}: it has the effect {effect.name!r} already; choose another one, or "
-            "take it out first with --remove"
-        )
+    return [k for k, each in enumerate(names) if each != effect.name]
 
 
 def _judged(
-    subject: Subject[F], action: str, effect: Effect, before: F, after: F, having: F
+    action: str, effect: Effect, models: Models[F], before: F, others: Models[F], after: F
 ) -> Step[F]:
-    """Return the step; `having` is the fit that has the effect."""
+    """Return the step between two models."""
+    having = after if action == "add" else before
     index = [each.name for each in having.effects].index(effect.name)
     strength, std = having.strengths[index], having.strength_std(index)
-    folds = tuple(subject.left_out())
-    held_before, held_after = (subject.held_out(fit, folds) for fit in (before, after))
+    folds = tuple(models.folds)
+    held_before, held_after = models.held_out(before), others.held_out(after)
     flags = []
     if ((strength < effect.low) | (strength > effect.high)).any():
         flags.append("out_of_range")
@@ -207,7 +192,7 @@ def _judged(
         std,
         before,
         after,
-        subject.floor(after),
+        others.floor(after),
         folds,
         held_before,
         held_after,

@@ -133,7 +133,8 @@ class ForceProblem:
         self.widths = np.full(len(self.names), WIDTH)
         self.ends = -np.full(len(self.names), np.inf), np.full(len(self.names), np.inf)
         self.size = float(np.sqrt(np.mean(self.measured**2))) * load / np.sqrt(np.mean(load**2))
-        self.noise = noise if np.isfinite(noise) else UNKNOWN_NOISE * float(np.mean(self.size))
+        self.noise_known = bool(np.isfinite(noise))
+        self.noise = noise if self.noise_known else UNKNOWN_NOISE * float(np.mean(self.size))
         self.dead: dict[str, str] = {}
         self._whiteners: dict[float, PointWhitener] = {}
         solved = self.solve(self.start)

@@ -13,8 +13,8 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.diagnose import plain_tires
 from tirelib.diagnose.forces.fit import ForceFit, Problem, slopes_at, with_effect
+from tirelib.diagnose.forces.models import plain_tires
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.errors import TirelibError
 from tirelib.identify.force_data import ForceData

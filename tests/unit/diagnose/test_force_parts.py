@@ -125,14 +125,13 @@ def test_errors_fall_from_step_to_step_to_that_of_the_final_model() -> None:
     made = problem(friction_power=-0.15)
     found = diagnose_force(made, VALUES, list(CATALOGUE.values()), noise=5.0)
     assert found.named == ("friction_load",)
-    ((name, error, held),) = found.steps
+    ((name, fit),) = found.steps
     assert name == "friction_load"
-    assert error == pytest.approx(found.final.error)
-    assert error < 0.2 * found.base.error
-    assert held == pytest.approx(pooled(found.held_final, found.folds))
-    assert held < 0.5 * pooled(found.held_before, found.folds)
+    assert fit is found.final
+    assert fit.error < 0.2 * found.base.error
+    assert found.held_out(fit) < 0.5 * found.held_out(found.base)
     first, *others = found.findings
     assert (first.effect.name, first.level) == ("friction_load", "alarm")
-    assert found.error_with(first) == pytest.approx(error)
+    assert found.error_with(first) == fit.error
     assert np.isnan(found.held_with(others[0]))
     assert found.error_with(others[0]) <= found.base.error

@@ -16,7 +16,7 @@ from tirelib.diagnose.diagnose import plain_tires
 from tirelib.diagnose.document import next_test
 from tirelib.diagnose.fitted import Fitted, fitted
 from tirelib.diagnose.floor import floor_of
-from tirelib.diagnose.held_out import folds, held_out_errors, pooled
+from tirelib.diagnose.held_out import folds, held_out, pooled
 from tirelib.diagnose.left import left_of
 from tirelib.effects import CATALOGUE
 from tirelib.identify.campaign_data import StraightRuns
@@ -95,10 +95,11 @@ def test_held_out_errors_are_of_runs_that_the_fit_has_not_seen(
     monkeypatch.setattr(Fitted, "without_runs", trained)
     strain = data.strain + 1e-3 * load.out[:, None] * np.cos(3.0 * GRID)
     spoiled = Yardstick.of(replace(runs(), strain=strain))
-    (error,) = held_out_errors(plain, [load], spoiled)
+    (error,) = held_out(plain, [load], spoiled)
+    assert error is not None
     assert seen[0].max() < LOADS[-1]
-    assert error == pytest.approx(spoiled.take(load.out).error(plain.model, 0.0).value)
-    assert error > 10.0 * spoiled.take(~load.out).error(plain.model, 0.0).value
+    assert error.value == pytest.approx(spoiled.take(load.out).error(plain.model, 0.0).value)
+    assert error.value > 10.0 * spoiled.take(~load.out).error(plain.model, 0.0).value
 
 
 def test_what_is_held_out_moves_no_number(plain: Fitted) -> None:

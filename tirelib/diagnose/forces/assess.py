@@ -11,7 +11,6 @@ from tirelib.compare.forces import UNITS, quantities_of, slips, usable_points
 from tirelib.diagnose.diagnose import FALSE_ALARM, Finding
 from tirelib.diagnose.forces.diagnose import ForceDiagnosis, diagnose_force
 from tirelib.diagnose.forces.fit import ForceFit, Problem
-from tirelib.diagnose.forces.floor import force_floor
 from tirelib.diagnose.forces.left import ForceLeft, left_of
 from tirelib.effects import Effect
 from tirelib.errors import CalibrationError
@@ -86,6 +85,10 @@ class ForceCase:
         """Return the error of a fitted brush as it is told."""
         return self.factor * self.rms(fit.values, fit.changes)
 
+    def told(self, part: float, fit: ForceFit) -> float:
+        """Return a part of a fitted brush's rms, SI, as a part of its error."""
+        return self.error(fit) * part / fit.error
+
     @property
     def given(self) -> float:
         """The error of the model as its file has it."""
@@ -99,7 +102,7 @@ class ForceCase:
     @property
     def strengths(self) -> list[np.ndarray]:
         """Their strengths, arrays of components."""
-        return [np.atleast_1d(np.asarray(u.strength, dtype=float)) for u in self.model.used]
+        return [used.components for used in self.model.used]
 
 
 def force_case(
@@ -257,21 +260,19 @@ def assess_forces(
         messages.append(
             "this campaign varies nothing with which an effect could show: see the dead effects"
         )
-    if named and not any(fold.main for fold in found.folds):
+    if named and not any(fold.main for fold in found.models.folds):
         messages.append("nothing can be held out: too few conditions vary")
     if named:
         messages += _instead(found) if verdict == "form_inadequate" else []
         messages += _in_order(case, [f.effect for f in findings if f.effect.name in named])
     final = found.final if named else found.base
-    best = found.verdict.best if named else found.verdict.base
-    floor = force_floor(case.problem, final, best, false_alarm)
     return ForceAssessment(
         case,
         found,
         verdict,
         named,
         findings,
-        case.error(final) * floor / final.error if np.isfinite(case.noise) else float("nan"),
+        case.told(found.models.floor(final), final),
         left_of(case.problem, final),
         tuple(messages),
     )

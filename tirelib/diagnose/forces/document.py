@@ -16,7 +16,8 @@ def force_diagnosis_document(told: ForceAssessment) -> dict[str, Any]:
     """Return the numbers; errors are in the noise of a point, in N or Nm without repeats."""
     found, case = told.diagnosis, told.case
     factor = case.factor
-    held_final = found.held_final if told.named else found.held_before
+    folds = found.models.folds
+    held_before, held_final = (found.models.held_out(fit) for fit in (found.base, told.final))
     return {
         "format": FORMAT,
         "campaign": case.name,
@@ -34,15 +35,19 @@ def force_diagnosis_document(told: ForceAssessment) -> dict[str, Any]:
         "residual_rms_before": told.before / factor,
         "residual_rms_after": told.after / factor,
         "residual_rms_unit": UNITS[case.quantity],
-        "heldout_error_before": factor * pooled(found.held_before, found.folds),
-        "heldout_error_after": factor * pooled(held_final, found.folds),
+        "heldout_error_before": factor * pooled(held_before, folds),
+        "heldout_error_after": factor * pooled(held_final, folds),
         "held_out": [
             fold_entry(fold, factor * old, factor * new)
-            for fold, old, new in zip(found.folds, found.held_before, held_final, strict=True)
+            for fold, old, new in zip(folds, held_before, held_final, strict=True)
         ],
         "steps": [
-            {"effect": name, "error": factor * error, "heldout_error": factor * held}
-            for name, error, held in (found.steps if told.named else ())
+            {
+                "effect": name,
+                "error": factor * fit.error,
+                "heldout_error": factor * found.held_out(fit),
+            }
+            for name, fit in (found.steps if told.named else ())
         ],
         "verdict": told.verdict,
         "named": list(told.named),

@@ -1,0 +1,192 @@
+"""Effects added to a model one after the other, each step from one set of fits.
+
+The model with all of them has them fitted at once; the models on the way have been fitted on the
+way to it. Where a diagnosis of the same campaign and model is at hand, its fits serve.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+
+from tirelib.campaign import Campaign
+from tirelib.compare.force_model import ForceModel, force_model_of
+from tirelib.compare.model import Model, model_of
+from tirelib.diagnose.document import Assessment
+from tirelib.diagnose.forces.assess import ForceAssessment, force_cases
+from tirelib.effects import Effect
+from tirelib.errors import ParameterError, TirelibError
+from tirelib.extend.document import extension_document
+from tirelib.extend.extension import (
+    Extension,
+    extended,
+    refuse,
+    remove_effect,
+    strain_models,
+)
+from tirelib.extend.force_document import force_extended_file, force_extension_document
+from tirelib.extend.force_extension import (
+    ForceExtension,
+    case_for,
+    extended_brush,
+    force_models,
+    refuse_brush,
+    remove_brush_effect,
+)
+from tirelib.extend.model_file import extended_file
+from tirelib.extend.step import Step
+from tirelib.identify.campaign_data import straight_runs
+from tirelib.parameters import TireFile
+from tirelib.waveforms import measure_waveforms
+
+Progress = Callable[[str], None]
+S = TypeVar("S", bound=Step[Any])
+Known = Model | ForceModel
+Extended = tuple[TireFile, dict[str, Any]]
+"""A model after a step, and ``tirelib-extension/1`` of it."""
+
+
+def additions(
+    effects: Sequence[Effect],
+    file: TireFile,
+    campaign: Campaign,
+    quantity: str | None,
+    catalogue: Mapping[str, Effect],
+    *,
+    diagnosis: Assessment | ForceAssessment | None = None,
+    failed: Callable[[Effect, TirelibError], None] | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Extended]:
+    """Yield the model with one effect more after the other.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        All of strain, or all of the brush.
+    file : TireFile
+    campaign : Campaign
+    quantity : str or None
+        Measured quantity to fit; by default strain, for an effect of the brush the force that it
+        helps most.
+    catalogue : mapping
+        Effects by name.
+    diagnosis : Assessment or ForceAssessment, optional
+        Of this campaign and model, whose fits serve.
+    failed : callable, optional
+        Called for an effect that cannot be added, which is then left out.
+    progress : callable, optional
+
+    Raises
+    ------
+    ParameterError
+        If an effect is there already, or acts on something else.
+    CalibrationError
+        If the campaign cannot inform an effect, unless `failed` is given.
+    """
+    names = [effect.name for effect in effects]
+    if len(set(names)) < len(names):
+        raise ParameterError(f"effects {', '.join(names)}: one is named twice; leave it out")
+    if isinstance(diagnosis, ForceAssessment):
+        _belongs(
+            diagnosis.case.name, diagnosis.case.model, campaign, force_model_of(file, catalogue)
+        )
+        case, brush = diagnosis.case, diagnosis.diagnosis.models
+        return _chain(effects, file, partial(extended_brush, brush, case), _brush(campaign), failed)
+    if diagnosis is None and acts_on_forces(effects[0], quantity):
+        case = case_for(force_cases(campaign, file, catalogue, quantity), effects[0])
+        for effect in effects:
+            refuse_brush(case, effect)
+        brush = force_models(case, effects, progress)
+        return _chain(effects, file, partial(extended_brush, brush, case), _brush(campaign), failed)
+    model = model_of(file, catalogue)
+    for effect in effects:
+        refuse(model, effect)
+    if diagnosis is None:
+        runs = straight_runs(measure_waveforms(campaign, progress=progress))
+        strain = strain_models(runs, model, effects, progress)
+    else:
+        strain = diagnosis.diagnosis.models
+        _belongs(strain.runs.waves.header.name, diagnosis.given, campaign, model)
+    return _chain(effects, file, partial(extended, strain, model), _strain(campaign), failed)
+
+
+def removal(
+    effect: Effect,
+    file: TireFile,
+    campaign: Campaign,
+    quantity: str | None,
+    catalogue: Mapping[str, Effect],
+    *,
+    progress: Progress | None = None,
+) -> Extended:
+    """Return the model without one of its effects; parameters as of `additions`.
+
+    Raises
+    ------
+    ParameterError
+        If the model does not have the effect.
+    """
+    if acts_on_forces(effect, quantity):
+        case = case_for(force_cases(campaign, file, catalogue, quantity), effect)
+        return _brush(campaign)(file, remove_brush_effect(case, effect, progress=progress))
+    runs = straight_runs(measure_waveforms(campaign, progress=progress))
+    step = remove_effect(runs, model_of(file, catalogue), effect, progress=progress)
+    return _strain(campaign)(file, step)
+
+
+def acts_on_forces(effect: Effect, quantity: str | None) -> bool:
+    """Return whether a force is fitted, and not strain."""
+    return quantity not in (None, "strain") or (quantity is None and effect.hook == "brush")
+
+
+def _belongs(name: str, of: Known, campaign: Campaign, model: Known) -> None:
+    """Refuse a diagnosis of another campaign, or of another model."""
+    same = [effect.effect.name for effect in of.used] == [each.effect.name for each in model.used]
+    same = same and of.values.keys() == model.values.keys()
+    same = same and all(
+        np.array_equal(value, of.values[key], equal_nan=True) for key, value in model.values.items()
+    )
+    if name != campaign.header.name or not same:
+        raise ParameterError(
+            f"diagnosis: it is of campaign {name!r} and model {of.name!r}, and the effects are to "
+            f"be added to {model.name!r} on {campaign.header.name!r}; diagnose that model, or "
+            "leave the diagnosis out"
+        )
+
+
+def _strain(campaign: Campaign) -> Callable[[TireFile, Extension], Extended]:
+    def written(file: TireFile, step: Extension) -> Extended:
+        new = extended_file(file, step, campaign.content_hash())
+        return new, extension_document(step, new)
+
+    return written
+
+
+def _brush(campaign: Campaign) -> Callable[[TireFile, ForceExtension], Extended]:
+    def written(file: TireFile, step: ForceExtension) -> Extended:
+        new = force_extended_file(file, step, campaign.content_hash())
+        return new, force_extension_document(step, new)
+
+    return written
+
+
+def _chain(
+    effects: Sequence[Effect],
+    file: TireFile,
+    step_of: Callable[[Effect, Any], S],
+    written: Callable[[TireFile, S], Extended],
+    failed: Callable[[Effect, TirelibError], None] | None,
+) -> Iterator[Extended]:
+    before = None
+    for effect in effects:
+        try:
+            step = step_of(effect, before)
+            file, document = written(file, step)
+        except TirelibError as error:
+            if failed is None:
+                raise
+            failed(effect, error)
+            continue
+        before = step.after
+        yield file, document
