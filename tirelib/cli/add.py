@@ -26,7 +26,6 @@ Examples:
   tirelib rig --plan short --hide sidewall_damping=0.05 --out straight
   tirelib identify straight --out M.toml
   tirelib add sidewall_damping --model M.toml --data straight --out M2.toml --report added
-  tirelib add tread_friction gage_length --model M.toml --data straight --out M3.toml
   tirelib add sidewall_damping --remove --model M2.toml --data straight --out M3.toml
   tirelib add --undo --model M2.toml --out M1.toml
 
