@@ -1,6 +1,10 @@
-"""The studio in a real browser: clicks from runs of forces to the added effect; attacks."""
+"""The studio in a real browser: from runs of forces to the added effect, out again; attacks.
+
+The tests of one campaign share what was fitted to it; each can be run alone.
+"""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -8,6 +12,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
@@ -34,11 +39,19 @@ def wait_for(page: Any, script: str) -> None:
         time.sleep(0.05)
 
 
+PROGRAM = ("-m", "tirelib", "studio")
+HELD = (str(Path(__file__).with_name("held_studio.py")),)
+"""The studio, and one whose refits wait while the file `hold` exists."""
+
+
 @contextmanager
-def serve(folder: Path, *words: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+def serve(
+    folder: Path, *words: str, program: tuple[str, ...] = PROGRAM
+) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """Run the server until the end, which is not a gentle one; give its process and address."""
-    command = [sys.executable, "-m", "tirelib", "studio", *words, "--session", str(folder / "s")]
-    with subprocess.Popen([*command, "--no-browser"], stdout=subprocess.PIPE, text=True) as server:
+    command = [sys.executable, *program, *words, "--session", str(folder / "s"), "--no-browser"]
+    surroundings = os.environ | {"HOLD": str(folder / "hold")}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=surroundings) as server:
         line = server.stdout.readline() if server.stdout is not None else ""
         try:
             yield server, line.partition(" ")[2].strip()
@@ -46,8 +59,35 @@ def serve(folder: Path, *words: str) -> Iterator[tuple[subprocess.Popen[str], st
             server.kill()
 
 
-def test_five_clicks_add_the_effect_that_forces_lack(browser: Any, tmp_path: Path) -> None:
-    write_forces(tmp_path / "steady", steady_runs(slope=0.25), "steady")
+@dataclass
+class Journey:
+    """What five clicks have led to, and what the browser asked for and complained of meanwhile."""
+
+    folder: Path
+    url: str
+    shown: str
+    shown_again: str
+    same_address: bool
+    complaints: list[str]
+    addresses: list[str]
+
+    def document(self, number: str, name: str) -> Any:
+        """Return what a command wrote of a model."""
+        place = next(self.folder.glob("s/campaigns/*/models")) / number / name
+        return json.loads(place.read_text())
+
+
+def page_at(browser: Any, url: str) -> Any:
+    page = browser.new_context(viewport={"width": 1280, "height": 800}).new_page()
+    page.set_default_timeout(1000.0 * PATIENCE)
+    page.goto(url)
+    return page
+
+
+@pytest.fixture(scope="module")
+def journey(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Journey:
+    folder = tmp_path_factory.mktemp("studio")
+    write_forces(folder / "steady", steady_runs(slope=0.25), "steady")
     complaints: list[str] = []
     addresses: list[str] = []
     page = browser.new_context(viewport={"width": 1280, "height": 800}).new_page()
@@ -55,7 +95,7 @@ def test_five_clicks_add_the_effect_that_forces_lack(browser: Any, tmp_path: Pat
     page.on("console", lambda said: complaints.append(said.text))
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("request", lambda request: addresses.append(request.url))
-    with serve(tmp_path, str(tmp_path / "steady")) as (server, url):
+    with serve(folder, str(folder / "steady")) as (server, url):
         page.goto(url)
         page.get_by_role("button", name="Find what is missing").click()  # click 1
         page.locator("input[data-effect=friction_load]").click()  # click 2
@@ -65,24 +105,107 @@ def test_five_clicks_add_the_effect_that_forces_lack(browser: Any, tmp_path: Pat
         shown = page.locator("#error-after").inner_text()
         server.kill()  # no goodbye
         wait_for(page, "studio.connected === false")
-    with serve(tmp_path) as (_, again):
-        assert again == url
+    with serve(folder) as (_, again):
         wait_for(page, "studio.connected === true")
         wait_for(second, "studio.campaign !== null && studio.campaign.current === '002'")
         page.reload()
-        assert page.locator("#error-after").inner_text() == shown
+        shown_again = page.locator("#error-after").inner_text()
+        wait_for(page, "!!studio.campaign.models[1].verdict")
     page.context.close()
-    place = next((tmp_path / "s").glob("campaigns/*/models/002"))
-    fit = json.loads((place / "fit.json").read_text())
-    assert shown == str(float(f"{fit['error_after']:.4g}"))
+    return Journey(folder, url, shown, shown_again, again == url, complaints, addresses)
+
+
+def digits(value: float) -> str:
+    """Return a number as the page shows it."""
+    return str(float(f"{value:.4g}"))
+
+
+def test_five_clicks_add_the_effect_that_forces_lack(journey: Journey) -> None:
+    assert journey.same_address
+    assert journey.shown_again == journey.shown
+    fit = journey.document("002", "fit.json")
+    assert journey.shown == digits(fit["error_after"])
     assert fit["effect"] == "friction_load"
     assert fit["error_after"] < fit["error_before"]
-    diagnosis = json.loads((place.parent / "001" / "Fy" / "diagnosis.json").read_text())
-    assert "friction_load" in diagnosis["named"]
+    assert "friction_load" in journey.document("001", "Fy/diagnosis.json")["named"]
     # the killed server leaves connections and answers unfinished; the page itself says nothing
-    assert all("WebSocket" in said or "net::ERR_" in said for said in complaints), complaints
-    host = re.split("[/?]", url)[2]
-    assert {re.split("[/?]", one)[2] for one in addresses if "://" in one} == {host}
+    assert all("WebSocket" in said or "net::ERR_" in said for said in journey.complaints), (
+        journey.complaints
+    )
+    host = re.split("[/?]", journey.url)[2]
+    assert {re.split("[/?]", one)[2] for one in journey.addresses if "://" in one} == {host}
+
+
+def test_unticking_fits_without_the_effect_and_both_models_stand_side_by_side(
+    browser: Any, journey: Journey
+) -> None:
+    with serve(journey.folder) as (_, url):
+        page = page_at(browser, url)
+        page.get_by_role("button", name="steady").click()
+        wait_for(page, "!!studio.campaign")
+        count = page.evaluate("studio.campaign.models.length")
+        page.evaluate("location.hash = '#/add/' + studio.wanted")
+        card = page.locator("[data-model='002']")
+        if (there := card.get_by_role("button", name="Continue from here")).count():
+            there.click()
+        page.evaluate("location.hash = '#/suspect/' + studio.wanted")
+        page.locator("input[data-owned=friction_load]").click()
+        number = f"{count + 1:03d}"
+        wait_for(page, f"studio.campaign.current === '{number}'")
+        shown = page.locator("#error-after").inner_text()
+        documents = f"studio.campaign.models[{count}].documents['Fy/plots.npz']"
+        wait_for(page, f"!!{documents}")
+        page.get_by_role("button", name="Compare two").click()
+        page.locator("dialog canvas").nth(1).wait_for()
+        told = page.locator("dialog tr", has_text="error").first.inner_text()
+        maps = [one.evaluate("c => c.toDataURL()") for one in page.locator("dialog canvas").all()]
+        page.context.close()
+    fit = journey.document(number, "fit.json")
+    assert (fit["action"], fit["effect"]) == ("remove", "friction_load")
+    assert shown == digits(fit["error_after"])
+    errors = [journey.document(n, "Fy/comparison.json")["error"] for n in ("001", "002", number)]
+    assert errors[2] == pytest.approx(errors[0], rel=1e-3)  # two fits of the same model
+    assert [word for word in told.split() if word[0].isdigit()] == [digits(e) for e in errors[1:]]
+    assert maps[0] != maps[1]
+
+
+BUSY = "studio.running.some(job => job.what === 'fitting' && job.done > 0)"
+
+
+def test_in_the_middle_of_a_refit_nothing_is_lost(browser: Any, journey: Journey) -> None:
+    hold = journey.folder / "hold"
+    hold.touch()
+    with serve(journey.folder, program=HELD) as (server, url):
+        page = page_at(browser, url)
+        page.get_by_role("button", name="steady").click()
+        wait_for(page, "!!studio.campaign")
+        count, before = page.evaluate("[studio.campaign.models.length, studio.campaign.current]")
+        page.evaluate("location.hash = '#/suspect/' + studio.wanted")
+        page.locator("input[data-effect=conicity]").click()
+        page.locator("#add").click()
+        wait_for(page, BUSY)
+        page.reload()
+        wait_for(page, BUSY)  # it goes on, and its progress is seen
+        second = page.context.new_page()
+        second.goto(page.url)
+        second.locator("[data-cancel]").click()
+        page.get_by_text("add conicity: cancelled").wait_for()
+        state = "[studio.running.length, studio.campaign.current]"
+        assert page.evaluate(state) == [0, before]
+        page.get_by_role("button", name="Run again").click()
+        wait_for(second, BUSY)
+        server.kill()  # no goodbye
+        page.get_by_text("The server does not answer; nothing is lost.").wait_for()
+    with serve(journey.folder, program=HELD):
+        page.get_by_text("add conicity: interrupted").wait_for()
+        hold.unlink()
+        page.get_by_role("button", name="Run again").last.click()
+        wait_for(second, f"studio.campaign.current === '{count + 1:03d}'")
+        wait_for(page, f"studio.campaign.current === '{count + 1:03d}'")
+        shown = [tab.locator("#error-after").inner_text() for tab in (page, second)]
+        page.context.close()
+    fit = journey.document(f"{count + 1:03d}", "fit.json")
+    assert shown == [digits(fit["error_after"])] * 2
 
 
 HOSTILE = """async target => {

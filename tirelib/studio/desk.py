@@ -18,6 +18,8 @@ EXAMPLE = {"plan": "short", "seed": 1, "hide": ["sidewall_damping=0.05"]}
 OF_CAMPAIGN = ("check", "show")
 OF_MODEL = ("identify", "add", "remove")
 OF_QUANTITY = ("compare", "diagnose", "traces", "plant", "next-test")
+GOES_ON = (*OF_CAMPAIGN, "identify", "compare", "diagnose", "traces")
+"""What follows by itself from opening a campaign or from a fit: after a restart it goes on."""
 TAKEN = ("report", "calibrate", "fmu")
 LONGEST_LABEL = 80
 
@@ -60,6 +62,10 @@ class Desk:
         }
         if not (session.folder / "effects.json").exists():
             jobs.add("catalogue", {}, {})
+        last = {(job.kind, str(job.subject)): job for job in jobs.all.values()}
+        for job in last.values():
+            if job.state == "interrupted" and job.kind in GOES_ON:
+                jobs.add(job.kind, job.order, job.subject)
 
     def do(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
         """Do what the page asks for.

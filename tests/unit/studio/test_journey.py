@@ -104,6 +104,24 @@ def test_a_restart_shows_the_same_and_what_ran_is_interrupted(served: Served, op
     until(lambda: not alive(pid))
 
 
+def test_what_nobody_has_asked_for_goes_on_after_a_restart(tmp_path: Path) -> None:
+    session, folder = Session(tmp_path / "session"), tmp_path / "session" / "jobs"
+    (tmp_path / "session" / "effects.json").write_text("{}")
+    killed = Jobs(folder, RUNNER)
+    subject = {"campaign": "tire-00000000", "model": "001", "quantity": "Fy"}
+    order = {"campaign": "c", "model": "m", "effect": "e"}
+    for kind in ("compare", "diagnose", "diagnose", "add"):
+        killed.add(kind, order, subject)
+    killed.cancel(killed.all[3])  # the user has ended the second diagnosis
+    for _ in range(2):  # two restarts in a row do not add it twice
+        jobs = Jobs(folder, RUNNER)
+        Desk(session, jobs, [])
+    assert [(j.kind, j.state) for j in jobs.all.values() if j.number > 4] == [
+        ("compare", "interrupted"),
+        ("compare", "waiting"),
+    ]
+
+
 def test_a_job_ends_when_its_server_is_gone(tmp_path: Path) -> None:
     os.environ["HOLD"], os.environ["SAID"] = str(tmp_path / "hold"), str(tmp_path / "said")
     (tmp_path / "hold").touch()
