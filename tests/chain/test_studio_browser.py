@@ -10,19 +10,21 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.bench.browser import chromium
 from tests.bench.programs import PATIENCE
 from tests.unit.force_campaigns import steady_runs, write_forces
 from tests.unit.studio.conftest import TOKEN, Served, until
+from tirelib.campaign import Run, read_campaign
 
 
 @pytest.fixture(scope="module")
@@ -206,6 +208,76 @@ def test_in_the_middle_of_a_refit_nothing_is_lost(browser: Any, journey: Journey
         page.context.close()
     fit = journey.document(f"{count + 1:03d}", "fit.json")
     assert shown == [digits(fit["error_after"])] * 2
+
+
+def drop(page: Any, path: Path) -> None:
+    """Drop a file or folder as a hand would: the browser itself reads it from the disk."""
+    session = page.context.new_cdp_session(page)
+    data = {"items": [], "files": [str(path)], "dragOperationsMask": 1}
+    for kind in ("dragEnter", "dragOver", "drop"):
+        session.send("Input.dispatchDragEvent", {"type": kind, "x": 600, "y": 500, "data": data})
+
+
+def write_german(path: Path, runs: Iterable[Run]) -> None:
+    """Write runs as a rig may: umlauts, commas, a word for a number, one unit that is wrong."""
+    lines = [
+        "Prüfstand Süd;;;;;;;",
+        "Messung;Zeit [s];Radlast [N];Seitenkraft [kN];Schräglaufwinkel [°];Sturz [°];"
+        "Druck vorn [bar];Geschwindigkeit [km/h]",
+    ]
+    for run in runs:
+        for k in range(8):
+            rig = {name: values[k] for name, values in run.rig.items()}
+            camber, word = 0.01 * (run.plan.run % 3), (run.plan.run, k) == (1, 3)
+            row = f"{run.plan.run};{10 * run.plan.run + 0.01 * k:.2f};{rig['Fz'] / 1e3:.3f};"
+            row += f"{rig['Fy'] / 1e3:.4f};{np.rad2deg(rig['slip_angle']):.2f};{camber:.2f};"
+            row += f"{'Übersteuert' if word else format(rig['pressure'] / 1e5, '.3f')};64.8"
+            lines.append(row.replace(".", ","))
+    path.write_bytes("\r\n".join(lines).encode("latin-1"))
+
+
+def test_what_is_dropped_is_checked_or_imported(browser: Any, tmp_path: Path) -> None:
+    few = list(steady_runs(loads=(2000.0, 4000.0), angles=(-2.0, 2.0), repeats=1))
+    write_forces(tmp_path / "bad", few, "bad")
+    (tmp_path / "bad" / "runs" / "002.mf4").unlink()
+    write_german(tmp_path / "messung.csv", few)
+    with serve(tmp_path) as (_, url):
+        page = page_at(browser, url)
+        page.evaluate("location.hash = '#/take/'")
+        drop(page, tmp_path / "bad")  # anywhere, in any step
+        page.locator("td.bad").first.wait_for()
+        check = json.loads(next(tmp_path.glob("s/campaigns/*/check.json")).read_text())
+        said = page.locator("#main").inner_text()
+        for problem in check["problems"]:
+            assert problem["where"] in said
+            assert problem["remedy"] in said
+        assert page.evaluate("studio.campaign.models.length") == 0
+        drop(page, tmp_path / "messung.csv")
+        page.get_by_text("Left out: Druck vorn [bar]: row 12 holds 'Übersteuert'").wait_for()
+        page.get_by_label("free radius in mm").fill("316,5")
+        page.get_by_label("unit of Radlast [N]").fill("kN")
+        page.get_by_label("kind").select_option("corner")
+        page.get_by_label("run_column").select_option("Messung")
+        page.get_by_label("text in a column of numbers").select_option("missing")
+        page.get_by_label("rows with a missing number").select_option("drop")
+        page.get_by_role("button", name="Read the files again").click()
+        page.get_by_label("quantity of Druck vorn [bar]").select_option("pressure")
+        page.get_by_label("unit of Druck vorn [bar]").fill("km/h")
+        page.locator("#import").click()
+        page.get_by_text("this form, [channels] pressure unit").wait_for()
+        assert page.get_by_role("heading", name="Columns [channels]").is_visible()
+        page.get_by_label("unit of Druck vorn [bar]").fill("bar")
+        page.locator("#import").click()
+        wait_for(page, "!!studio.campaign && studio.campaign.title === 'messung'")
+        page.context.close()
+    made = read_campaign(next(tmp_path.glob("s/jobs/*/out/campaign")))
+    runs = list(made.runs())
+    assert [run.plan.load for run in runs] == [2000.0, 2000.0, 4000.0, 4000.0]
+    assert {run.plan.camber for run in runs} == {0.0}
+    assert made.header.tire.free_radius == pytest.approx(0.3165)
+    assert len(runs[1].rig["pressure"]) == 7  # the row of the word is left out
+    assert runs[1].rig["pressure"] == pytest.approx(2.1e5)
+    assert runs[1].rig["Fz"] == pytest.approx(2000.0)
 
 
 HOSTILE = """async target => {

@@ -52,6 +52,12 @@ def _hidden(order: Order) -> list[str]:
     return [word for each in order.get("hide", ()) for word in ("--hide", str(each))]
 
 
+def _read(order: Order) -> list[str]:
+    """Return the words that read foreign files, with the layout that the user has stated."""
+    layout = ["--map", str(order["map"])] if order.get("map") else []
+    return ["import", *order["files"], *layout]
+
+
 def _compared(order: Order) -> list[str]:
     return ["compare", order["campaign"], "--model", order["model"], *_about(order)]
 
@@ -84,12 +90,10 @@ KINDS: Mapping[str, Kind] = {
     ),
     "columns": Kind(
         "list the columns of the files",
-        lambda o, out: ["import", *o["files"], "--list", "--json", f"{out}/columns.json"],
+        lambda o, out: [*_read(o), "--list", "--json", f"{out}/columns.json"],
         ("columns.json",),
     ),
-    "suggest": Kind(
-        "draft a map of the columns", lambda o, out: ["import", *o["files"], "--suggest"]
-    ),
+    "suggest": Kind("draft a map of the columns", lambda o, out: [*_read(o), "--suggest"]),
     "import": Kind(
         "make a campaign from the files",
         lambda o, out: [

@@ -47,6 +47,7 @@ class Desk:
             "example": self._example,
             "dropped": self.receiving.dropped,
             "columns": self.receiving.columns,
+            "read-again": self.receiving.read_again,
             "import": self.receiving.make_campaign,
             "fit": self._fit_again,
             "look": self._look,

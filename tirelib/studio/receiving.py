@@ -9,10 +9,11 @@ from typing import Any
 
 import tomli_w
 
+from tirelib.campaign.importing.mapreader import FORMAT as MAP_FORMAT
 from tirelib.errors import FormatError, ParameterError
 from tirelib.studio import intake
 from tirelib.studio.disk import read_document, safe_name, write_atomic
-from tirelib.studio.jobs import Jobs
+from tirelib.studio.jobs import Job, Jobs
 from tirelib.studio.session import Session
 
 
@@ -75,31 +76,55 @@ class Receiving:
         place = self.session.new_files()
         return self._foreign(place.name, [file])
 
+    def read_again(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Read dropped files again, as the form states their layout."""
+        number, stated = str(wish.get("files", "")), wish.get("map")
+        place, files = self.files(number), self._read(number)
+        if not isinstance(stated, dict) or files is None:
+            raise ParameterError("import: a layout and files are needed; drop the files again")
+        self._list(number, files, self._written(place / "layout.toml", stated))
+        return {"files": number}
+
     def _foreign(self, number: str, files: Sequence[Path]) -> Mapping[str, Any]:
         if not files:
             raise FormatError(
                 "nothing that can be opened was dropped; a campaign folder (or its zip archive), "
                 f"measured files ({', '.join(intake.FOREIGN)}) or an effect file (.py) is needed"
             )
-        order = {"files": [str(path) for path in files], "place": number}
+        self._list(number, [str(path) for path in files])
+        return {"files": number}
+
+    def _list(self, number: str, files: Sequence[str], layout: str = "") -> None:
+        """Begin to list the columns, and to draft a map."""
+        order = {"files": list(files), "place": number, "map": layout}
         for kind in ("columns", "suggest"):
             self.jobs.add(kind, order, {"files": number})
-        return {"files": number}
+
+    def _last(self, number: str) -> dict[str, Job]:
+        """Return the last job of each kind on dropped files."""
+        every = self.jobs.all.values()
+        return {job.kind: job for job in every if job.subject.get("files") == number}
+
+    def _read(self, number: str) -> list[str] | None:
+        """Return the paths of dropped files that were listed."""
+        listed = self._last(number).get("columns")
+        return None if listed is None else list(listed.order["files"])
 
     def import_form(self, number: str) -> dict[str, Any]:
         """Return what is known of dropped files: columns, a draft of the map, faults."""
         self.files(number)
-        mine = [job for job in self.jobs.all.values() if job.subject.get("files") == number]
         found: dict[str, Any] = {"files": number, "map": None, "columns": None, "message": ""}
-        for job in mine:
-            if job.state == "failed":
+        last = self._last(number)
+        for kind in ("columns", "suggest"):
+            job = last.get(kind)
+            if job is not None and job.state == "failed":
                 found["message"] = job.message
-            if job.state != "done":
+            if job is None or job.state != "done":
                 continue
-            if job.kind == "columns":
+            if kind == "columns":
                 found["columns"] = read_document(self.jobs.out(job) / "columns.json")
                 found["names"] = [Path(path).name for path in job.order["files"]]
-            elif job.kind == "suggest":
+            else:
                 text = (self.jobs.place(job) / "stdout.txt").read_text(encoding="utf-8")
                 try:
                     found["map"] = tomllib.loads(text)
@@ -110,18 +135,22 @@ class Receiving:
     def make_campaign(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
         """Begin to make a campaign of dropped files with the map of the form."""
         number = str(wish.get("files", ""))
-        place, drawn = self.files(number), wish.get("map")
-        mine = [j for j in self.jobs.all.values() if j.subject.get("files") == number]
-        files = next((j.order["files"] for j in mine if j.kind == "columns"), None)
+        place, drawn, files = self.files(number), wish.get("map"), self._read(number)
         if not isinstance(drawn, dict) or files is None:
             raise ParameterError("import: a map and files are needed; drop the files again")
+        order = {"files": files, "map": self._written(place / "map.toml", drawn)}
+        job = self.jobs.add("import", order, {"files": number})
+        text = Path(order["map"]).read_text(encoding="utf-8")
+        return {"job": job.number, "map": order["map"], "text": text}
+
+    def _written(self, path: Path, drawn: Mapping[str, Any]) -> str:
+        """Write a map as the form has drawn it; return its path."""
         try:
-            text = tomli_w.dumps(drawn)
+            text = tomli_w.dumps({"format": MAP_FORMAT, **drawn})
         except (TypeError, ValueError) as error:
             raise ParameterError(f"import: the map cannot be written ({error})") from None
-        write_atomic(place / "map.toml", text)
-        order = {"files": files, "map": str(place / "map.toml")}
-        return {"job": self.jobs.add("import", order, {"files": number}).number}
+        write_atomic(path, text)
+        return str(path)
 
     def _received(self, file: Path) -> dict[str, Any]:
         """Keep a user's effect file; it is not run, and the page shows what is in it."""

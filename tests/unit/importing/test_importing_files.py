@@ -1,5 +1,6 @@
 """Formats: what is damaged, mistaken or ambiguous is refused; what was found out is said."""
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -242,4 +243,20 @@ def test_a_draft_is_a_map_once_its_gaps_are_filled(
         "pressure",
         "speed",
         "tread_temperature",
+    }
+
+
+def test_a_german_file_is_drafted_with_what_the_rig_held(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    names = (
+        "Zeit [s];Radlast [kN];Schr\u00e4glaufwinkel [\u00b0];Geschwindigkeit [km/h];Schlupf [%]"
+    )
+    rows = [f"0,{k};4,{k};{k},5;64,8;0" for k in range(9)]
+    file.write_bytes("\n".join([names, *rows]).encode("latin-1"))
+    draft = tomllib.loads(suggest_map(file))["channels"]
+    assert {quantity: rule["unit"] for quantity, rule in draft.items()} == {
+        "time": "s",
+        "Fz": "kN",
+        "slip_angle": "\u00b0",
+        "speed": "km/h",  # constant, as a rig holds it; a slip that is always 0 was not connected
     }

@@ -1,7 +1,8 @@
 """Content of a file, and a first draft of its map for known names.
 
-The names are those of the tire test consortium (FX, SA, IA, ...), of TYDEX (FYW, SLIPANGL, ...)
-and of a campaign itself. What the file does not say, the draft leaves open.
+The names are those of the tire test consortium (FX, SA, IA, ...), of TYDEX (FYW, SLIPANGL, ...),
+of German rigs (Radlast, Schlupf, ...) and of a campaign itself. What the file does not say, the
+draft leaves open.
 """
 
 import json
@@ -57,8 +58,32 @@ KNOWN_NAMES: Mapping[str, str] = {
     "DSTGRWHC": "loaded_radius",
     "T": "time",
     "TIMESTAMP": "time",
+    "ZEIT": "time",
+    "RADLAST": "Fz",
+    "AUFSTANDSKRAFT": "Fz",
+    "SEITENKRAFT": "Fy",
+    "QUERKRAFT": "Fy",
+    "LAENGSKRAFT": "Fx",
+    "UMFANGSKRAFT": "Fx",
+    "KIPPMOMENT": "Mx",
+    "RUECKSTELLMOMENT": "Mz",
+    "SCHRAEGLAUFWINKEL": "slip_angle",
+    "STURZ": "camber",
+    "STURZWINKEL": "camber",
+    "SCHLUPF": "slip_ratio",
+    "LAENGSSCHLUPF": "slip_ratio",
+    "FUELLDRUCK": "pressure",
+    "LUFTDRUCK": "pressure",
+    "REIFENDRUCK": "pressure",
+    "REIFENFUELLDRUCK": "pressure",
+    "GESCHWINDIGKEIT": "speed",
+    "DREHZAHL": "omega",
+    "RADDREHZAHL": "omega",
 }
-"""Column names of the field, in capitals, and their quantities."""
+"""Column names of the field, in capitals, and their quantities; umlauts as two letters."""
+CONSTANT = ("pressure", "speed")
+"""Quantities that a rig may hold; anything else that never changes was not connected."""
+_UMLAUTS = str.maketrans({"\u00c4": "AE", "\u00d6": "OE", "\u00dc": "UE"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,16 +146,16 @@ def quantity_of(name: str) -> str:
 
     Examples
     --------
-    >>> quantity_of("SA"), quantity_of("Fz [kN]"), quantity_of("strain_2"), quantity_of("X7")
-    ('slip_angle', 'Fz', 'strain_2', '')
+    >>> quantity_of("SA"), quantity_of("speed [km/h]"), quantity_of("strain_2"), quantity_of("X7")
+    ('slip_angle', 'speed', 'strain_2', '')
     """
-    bare = re.sub(r"\s*[\[(].*[\])]$", "", name.rpartition(".")[2].rpartition("/")[2]).strip()
+    bare = re.sub(r"\s*[\[(].*[\])]$", "", name).rpartition(".")[2].rpartition("/")[2].strip()
     own = {quantity.casefold(): quantity for quantity in QUANTITIES if quantity != "load"}
     if bare.casefold() in own:
         return own[bare.casefold()]
     if strain_number(bare.casefold()) is not None or bare.endswith("_temperature"):
         return bare.casefold()
-    return KNOWN_NAMES.get(bare.upper(), "")
+    return KNOWN_NAMES.get(bare.upper().translate(_UMLAUTS), "")
 
 
 def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
@@ -154,7 +179,8 @@ def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
     known: dict[str, ColumnSummary] = {}
     others: list[ColumnSummary] = []
     for item in summaries:
-        useless = item.low == item.high and item.quantity != "time" and item.rows > 1
+        steady = item.quantity in CONSTANT and item.low != 0.0
+        useless = item.low == item.high and not steady and item.quantity != "time" and item.rows > 1
         if item.quantity and item.quantity not in known and not useless:
             known[item.quantity] = item
         else:

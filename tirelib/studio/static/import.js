@@ -1,65 +1,149 @@
-// Foreign files: the columns that were found and the draft of a map, as a form.
+// Foreign files: the columns that were found and the draft of a map, as a form. Each part is headed as the map calls it, for the messages of the import name these.
 import { app, get, listen, wish } from "./data.js";
 import { dialog, h, number, toast } from "./dom.js";
 
 const QUANTITIES = ["", "time", "Fz", "Fy", "Fx", "Mz", "Mx", "My", "slip_angle", "camber", "slip_ratio", "pressure", "speed", "omega", "loaded_radius", "effective_radius", "tread_temperature", "tread_inner_temperature", "tread_outer_temperature", "ambient_temperature", "road_temperature", "trigger", "strain_1", "strain_2", "strain_3", "strain_4", "strain_5"];
+const AXES = [["", "choose"], ["sae", "SAE J670: Fz negative under load"], ["iso", "ISO 8855: Fz positive, positive slip angle gives negative Fy"], ["adapted_sae", "adapted SAE: positive slip angle gives positive Fy"]];
+const KINDS = [["sweep", "one sweep: conditions change all the time"], ["corner", "steady cornering runs"], ["camber", "steady camber runs"], ["free", "steady straight runs"], ["brake", "steady braking runs"], ["drive", "steady driving runs"], ["combined", "steady combined slip"]];
+// Set points of steady runs: key of the map, quantity, unit, step to which a mean is rounded, number where nothing was measured.
+const POINTS = [["load_N", "Fz", "N", 100, ""], ["pressure_bar", "pressure", "bar", 0.1, ""], ["speed_kmh", "speed", "km/h", 1, ""], ["slip_angle_deg", "slip_angle", "deg", 0.5, 0], ["camber_deg", "camber", "deg", 0.5, 0], ["slip_ratio", "slip_ratio", "1", 0.01, 0]];
+const DEFECTS = [["text", "text in a column of numbers", [["missing", "is a missing number"]]], ["missing", "rows with a missing number", [["drop", "leave out"], ["interpolate", "interpolate in time"]]], ["repeated_time", "rows with the same time", [["drop", "keep the first"]]], ["backward_time", "time that goes back", [["drop", "leave out"], ["join", "join the segments"]]]];
+const SEPARATORS = [["", "found by itself"], [";", "semicolon"], [",", "comma"], ["\t", "tab"], ["|", "bar"], [" ", "blanks"]];
+const DECIMALS = [["", "found by itself"], [",", "comma: 1,5"], [".", "point: 1.5"]];
 
-export async function importForm(files) {
+const field = (value, label, size = 8) => h("input", { value: value ?? "", size, "aria-label": label });
+const select = (options, value, label, change = () => {}) => { const made = h("select", { "aria-label": label, onchange: () => change(made.value) }, options.map(([k, t]) => h("option", { value: k }, t))); made.value = value ?? ""; return made; };
+const amount = (text) => (String(text).trim() ? Number(String(text).trim().replace(",", ".")) : NaN);
+const part = (title, key, ...content) => h("section", {}, h("h3", {}, title, " ", h("code", { class: "quiet" }, key)), ...content);
+
+// Wait for what the server finds out about the files: columns and a draft of the map, or why not.
+function found(files) {
   dialog("Import", h("p", { role: "status" }, "The columns of the files are being read."));
-  const form = await new Promise((done) => {
+  return new Promise((done) => {
     const look = async () => {
-      const found = await get("/import-form", { files }).catch((error) => ({ message: error.message }));
-      if (found.message || (found.columns && found.map)) { stop(); done(found); }
+      const form = await get("/import-form", { files }).catch((error) => ({ message: error.message }));
+      if (form.message || (form.columns && form.map)) { stop(); done(form); }
     };
     const stop = listen((what) => { if (what === "state") look(); });
     look();
   });
-  if (form.message && !form.columns) { dialog("Import", h("p", { class: "bad" }, form.message)); return; }
-  const { map, columns } = form, taken = new Map(Object.entries(map.channels || {}).map(([q, c]) => [c.column, [q, c]]));
-  const field = (value, attributes = {}) => h("input", { value: value ?? "", size: 12, ...attributes });
-  const name = field(map.name, { size: 30, "aria-label": "name" }), radius = field(map.tire?.free_radius_m ? 1000 * map.tire.free_radius_m : "", { "aria-label": "free radius in mm", inputmode: "decimal" });
-  const axes = h("select", { "aria-label": "axes" }, [["", "choose"], ["sae", "SAE J670: Fz negative under load"], ["iso", "ISO 8855: Fz positive, positive slip angle gives negative Fy"], ["adapted_sae", "adapted SAE: positive slip angle gives positive Fy"]].map(([k, t]) => h("option", { value: k }, t)));
-  axes.value = map.axes || "";
-  const kind = h("select", { "aria-label": "kind" }, [["sweep", "one sweep: conditions change all the time"], ["corner", "steady cornering runs, one a file"], ["free", "steady straight runs, one a file"], ["combined", "steady combined slip, one a file"]].map(([k, t]) => h("option", { value: k }, t)));
-  kind.value = map.kind || "sweep";
-  const rows = columns.files[0].columns.map((column) => {
-    const [quantity, channel] = taken.get(column.name) || ["", {}];
-    const select = h("select", { "aria-label": `quantity of ${column.name}` }, [...new Set([...QUANTITIES, quantity])].map((q) => h("option", { value: q }, q || "leave out")));
-    select.value = quantity;
-    const unit = field(channel.unit ?? column.unit, { size: 7, "aria-label": `unit of ${column.name}` });
-    return { column: column.name, select, unit, element: h("tr", {}, h("td", {}, column.name), h("td", { class: "n" }, `${number(column.min)} … ${number(column.max)}`), h("td", { class: "n" }, column.missing || ""), h("td", {}, select), h("td", {}, unit)) };
+}
+
+// How text tables are read: what is stated here is read again at once, with all that follows from it.
+function layout(files, before, again) {
+  const csv = before.csv || {}, names = field(csv.names_line, "names_line", 3), units = field(csv.units_line, "units_line", 3);
+  const separator = select(SEPARATORS, csv.separator, "separator"), decimal = select(DECIMALS, csv.decimal, "decimal");
+  const chosen = Object.fromEntries(DEFECTS.map(([key, text, options]) => [key, select([["", "refuse"], ...options], before[key], text)]));
+  const lines = () => ({ ...(amount(names.value) > 0 ? { names_line: amount(names.value) } : {}), ...(amount(units.value) > 0 ? { units_line: amount(units.value) } : {}) });
+  const drawn = () => {
+    const stated = { ...(separator.value ? { separator: separator.value } : {}), ...(decimal.value ? { decimal: decimal.value } : {}), ...lines() };
+    return { ...Object.fromEntries(DEFECTS.map(([key]) => [key, chosen[key].value]).filter(([, v]) => v)), ...(Object.keys(stated).length ? { csv: stated } : {}) };
+  };
+  const element = h("div", {}, part("How a text table is read", "[csv]", h("div", { class: "row" },
+    h("label", {}, "separator ", separator), h("label", {}, "decimal ", decimal), h("label", {}, "names_line ", names), h("label", {}, "units_line ", units))),
+  part("Defects of the recording", "", h("div", { class: "row" }, DEFECTS.map(([key, text]) => h("label", {}, h("code", { class: "quiet" }, key), ` ${text} `, chosen[key])))),
+  h("button", { type: "button", id: "read-again", onclick: async () => { if (await wish({ do: "read-again", files, map: drawn() })) again(drawn()); } }, "Read the files again"));
+  return { element, drawn };
+}
+
+// Set points of runs that are no sweep: the mean of the measurement, a number, or a column.
+function points(measured, columns) {
+  const rows = POINTS.map(([key, quantity, unit, step, fallback]) => {
+    const value = field("", `${key} value`, 6), column = select([["", "choose a column"], ...columns.map((c) => [c.name, c.name])], "", `${key} column`), columnUnit = field(unit, `${key} unit`, 5);
+    const how = select([["mean_to", `mean of ${quantity}, rounded to`], ["value", "the same in all runs"], ["column", "a column, constant in a run"]], "", `${key} from`, () => show());
+    const show = () => { column.hidden = columnUnit.hidden = how.value !== "column"; value.hidden = how.value === "column"; value.value = how.value === "mean_to" ? step : fallback; };
+    return { key, quantity, how, value, column, columnUnit, show, element: h("tr", {}, h("td", {}, key), h("td", {}, how), h("td", {}, value, column, columnUnit)) };
   });
-  const said = h("p", { class: "bad", role: "alert" });
-  const go = async () => {
-    said.textContent = "";
-    const faults = [];
-    if (!axes.value) faults.push("Choose the axis system of the files.");
-    if (!(Number(radius.value) > 100)) faults.push("Give the free radius of the tire in mm, for instance 316.");
+  return {
+    element: h("table", {}, h("tbody", {}, rows.map((r) => r.element))),
+    update: () => rows.filter((r) => !r.how.dataset.given).forEach((r) => { const how = measured().has(r.quantity) ? "mean_to" : "value"; if (r.how.value !== how) { r.how.value = how; r.show(); } }),
+    drawn: (faults) => Object.fromEntries(rows.map((r) => {
+      const x = amount(r.value.value);
+      if (r.how.value === "column") { if (!r.column.value) faults.push(`[set_points] ${r.key}: choose a column.`); return [r.key, { column: r.column.value, unit: r.columnUnit.value.trim() }]; }
+      if (!Number.isFinite(x)) faults.push(`[set_points] ${r.key}: give a number, or map the column of ${r.quantity}.`);
+      return [r.key, r.how.value === "mean_to" ? { mean_to: x } : x];
+    })),
+  };
+}
+
+// A column of the file: its quantity, and a unit that may differ from what the file states.
+function columnRow(column, taken, change) {
+  const [quantity, channel] = taken.get(column.name) || ["", {}];
+  const chosen = select([...new Set([...QUANTITIES, quantity])].map((q) => [q, q || "leave out"]), quantity, `quantity of ${column.name}`, () => change());
+  const unit = field(channel.unit || column.unit, `unit of ${column.name}`, 7), factor = field(1, `factor of ${column.name}`, 4);
+  const wrong = () => Boolean(column.unit) && unit.value.trim() !== column.unit;
+  const said = h("div", { class: "small warn" });
+  unit.addEventListener("input", () => { said.textContent = wrong() ? `instead of ${column.unit} in the file` : ""; });
+  const rule = () => ({ column: column.name, unit: unit.value.trim(), ...(wrong() ? { override_unit: true } : {}), ...(amount(factor.value) !== 1 ? { factor: amount(factor.value) } : {}) });
+  return { column: column.name, chosen, rule, element: h("tr", {}, h("td", {}, column.name), h("td", { class: "n" }, `${number(column.min)} … ${number(column.max)}`), h("td", { class: "n" }, column.missing || ""), h("td", {}, chosen), h("td", {}, unit, said), h("td", {}, factor)) };
+}
+
+// What the user has given stays when the files are read again: fields by their labels.
+document.addEventListener("change", (event) => { event.target.dataset.given = "1"; });
+const fields = () => [...document.querySelectorAll("#dialog [aria-label]")];
+const given = () => new Map(fields().filter((one) => one.dataset.given).map((one) => [one.getAttribute("aria-label"), one.value]));
+function restore(before) {
+  for (const one of fields()) {
+    const value = before.get(one.getAttribute("aria-label"));
+    if (value === undefined || (one.options && ![...one.options].some((o) => o.value === value))) continue;
+    one.value = value;
+    one.dataset.given = "1";
+    for (const kind of ["input", "change"]) one.dispatchEvent(new Event(kind));
+  }
+}
+
+export async function importForm(files, read = {}, before = new Map()) {
+  const form = await found(files), again = (stated) => importForm(files, stated, given()), how = layout(files, read, again);
+  if (!form.columns) { dialog("Import", h("p", { class: "bad said" }, form.message), h("p", {}, "State below how the file is to be read, or export it again."), how.element); return; }
+  const { map, columns } = form, file = columns.files[0], taken = new Map(Object.entries(map?.channels || {}).map(([q, c]) => [c.column, [q, c]]));
+  const name = field(map?.name, "name", 30), radius = field(map?.tire?.free_radius_m ? 1000 * map.tire.free_radius_m : "", "free radius in mm"), lateral = field("", "positions of the gages in mm", 26);
+  const axes = select(AXES, map?.axes, "axes"), runColumn = select([["", "each file is a run"], ...file.columns.map((c) => [c.name, c.name])], "", "run_column");
+  const rows = file.columns.map((column) => columnRow(column, taken, () => update()));
+  const measured = () => new Set(rows.map((r) => r.chosen.value).filter(Boolean)), gages = () => [...measured()].filter((q) => q.startsWith("strain_"));
+  const set = points(measured, file.columns), steady = part("Set points of the runs", "[set_points]", h("p", { class: "small quiet" }, "Runs of the same set points are repeats; the noise is known from them. Round the means so far that repeats agree."), set.element);
+  const kind = select(KINDS, map?.kind || "sweep", "kind", () => update()), strain = part("Gages", "[gages] lateral_m", h("label", {}, "Positions across the tire, from strain_1 on, with blanks between ", lateral, " mm"));
+  const update = () => { steady.hidden = kind.value === "sweep"; strain.hidden = !gages().length; set.update(); };
+  const said = h("p", { class: "bad said", role: "alert" }), sent = h("details", { hidden: true }, h("summary", {}, "The map that was sent"), h("pre", {}));
+  const drawn = (faults) => {
     const channels = {};
-    for (const row of rows.filter((r) => r.select.value)) {
-      if (channels[row.select.value]) faults.push(`Two columns are ${row.select.value}; leave one out.`);
-      channels[row.select.value] = { column: row.column, unit: row.unit.value.trim() };
+    for (const row of rows.filter((r) => r.chosen.value)) {
+      if (channels[row.chosen.value]) faults.push(`Two columns are ${row.chosen.value}; leave one out.`);
+      channels[row.chosen.value] = row.rule();
     }
+    if (!axes.value) faults.push("Choose the axis system of the files.");
+    if (!(amount(radius.value) > 100)) faults.push("Give the free radius of the tire in mm, for instance 316.");
     if (!Object.keys(channels).length) faults.push("Choose at least one column.");
-    if (faults.length) { said.textContent = faults.join(" "); return; }
-    const gages = rows.some((r) => r.select.value.startsWith("strain_")) && map.gages ? { gages: map.gages } : {};
-    const drawn = { format: "tirelib-map/1", axes: axes.value, name: name.value || "imported", kind: kind.value, ...(map.csv ? { csv: map.csv } : {}), tire: { ...(map.tire || {}), free_radius_m: Number(radius.value) / 1000 }, ...gages, channels };
-    const done = await wish({ do: "import", files, map: drawn });
+    const places = lateral.value.trim().split(/[\s;]+/).filter(Boolean).map(amount);
+    if (gages().length && (places.length !== gages().length || !places.every(Number.isFinite))) faults.push(`[gages] lateral_m: give ${gages().length} positions in mm.`);
+    return { format: "tirelib-map/1", axes: axes.value, name: name.value || "imported", kind: kind.value, ...(runColumn.value ? { run_column: runColumn.value } : {}), ...how.drawn(), tire: { ...(map?.tire || {}), free_radius_m: amount(radius.value) / 1000 },
+      ...(gages().length ? { gages: { lateral_m: places.map((x) => x / 1000) } } : {}), ...(kind.value === "sweep" ? {} : { set_points: set.drawn(faults) }), channels };
+  };
+  const go = async () => {
+    const faults = [], made = drawn(faults);
+    said.className = "bad said";
+    said.textContent = faults.join("\n");
+    const done = faults.length ? null : await wish({ do: "import", files, map: made });
     if (!done) return;
     app.follow = done.job;
-    said.className = "";
+    said.className = "said";
     said.textContent = "The files are being imported.";
+    sent.hidden = false; sent.lastChild.textContent = done.text;
     const stop = listen((what) => {
       if (what !== "state") return;
       const job = app.home.jobs.find((one) => one.job === done.job);
-      if (job?.state === "failed") { stop(); said.className = "bad"; said.textContent = job.message; }
+      if (job?.state === "failed") { stop(); said.className = "bad said"; said.textContent = job.message.replaceAll(done.map, "this form"); }
       if (job?.state === "done") { stop(); document.getElementById("dialog").close(); toast("The campaign was made."); }
     });
   };
   dialog(`Import ${(form.names || []).join(", ")}`,
-    h("p", {}, "The names were recognised where they are usual ones. Check the axis system, the units, and give the free radius of the tire; leave out what does not belong to the measurement, and columns whose range is impossible (a turn rate or a rolling radius of a broken encoder)."),
-    h("div", { class: "row" }, h("label", {}, "Axes of the files ", axes), h("label", {}, "Kind ", kind)),
-    h("div", { class: "row" }, h("label", {}, "Name ", name), h("label", {}, "Free radius ", radius, " mm")),
-    h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["column", "range", "missing", "quantity", "unit in the file"].map((t, i) => h("th", { class: i === 1 || i === 2 ? "n" : "" }, t)))), h("tbody", {}, rows.map((r) => r.element)))),
-    said, h("button", { class: "main", type: "button", onclick: go }, "Import"));
+    h("p", {}, "Usual names of columns are recognised. Check the axis system, the units, and give the free radius of the tire; leave out what does not belong to the measurement, and columns whose range is impossible (a turn rate or a rolling radius of a broken encoder)."),
+    form.message ? h("p", { class: "bad said" }, form.message) : null,
+    part("Campaign", "name, axes, [tire] free_radius_m", h("div", { class: "row" }, h("label", {}, "Name ", name), h("label", {}, "Axes of the files ", axes), h("label", {}, "Free radius ", radius, " mm"))),
+    part("Runs", "kind, run_column", h("div", { class: "row" }, h("label", {}, "Kind ", kind), h("label", {}, "A run is ", runColumn))), steady,
+    part("Columns", "[channels]", h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["column", "range", "missing", "quantity", "unit", "factor"].map((t, i) => h("th", { class: i === 1 || i === 2 ? "n" : "" }, t)))), h("tbody", {}, rows.map((r) => r.element)))),
+      Object.entries(file.left_out || {}).map(([column, why]) => h("p", { class: "small warn" }, `Left out: ${column}: ${why}`))), strain,
+    h("details", { open: Boolean(Object.keys(read).length) || Object.keys(file.left_out || {}).length > 0 }, h("summary", {}, "How the files are read"), (file.notes || []).map((note) => h("p", { class: "small quiet" }, note)), how.element),
+    said, h("button", { class: "main", type: "button", id: "import", onclick: go }, "Import"), sent);
+  restore(before);
+  update();
 }
