@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import IntArray
+from tirelib.arrays import FloatArray, IntArray
 from tirelib.compare.forces import ForceComparison
 from tirelib.compare.sentences import told
 from tirelib.identify.error_bands import levels
-from tirelib.identify.force_points import CELL_ANGLE
+from tirelib.identify.force_data import ForceData
+from tirelib.identify.force_points import CELL_ANGLE, CELL_RATIO
 
 LEAST_POINTS = 3
 """Points that a curve has at least."""
@@ -47,12 +48,31 @@ def slip_of(quantity: str) -> str:
     return "slip_ratio" if quantity == "Fx" else "slip_angle"
 
 
+def set_point_levels(data: ForceData) -> dict[str, IntArray]:
+    """Return numbers of the set points of points, each of shape (n,), by condition.
+
+    Points of one number are at one set point: they differ by no more than the rig's scatter.
+    """
+
+    def cells(values: FloatArray, size: float) -> IntArray:
+        return np.round(np.nan_to_num(values) / size).astype(np.int64)
+
+    return {
+        "load": levels(data.load),
+        "pressure": levels(data.pressure),
+        "speed": levels(np.abs(data.speed)),
+        "slip_angle": cells(data.slip_angle, CELL_ANGLE),
+        "camber": cells(data.camber, CELL_ANGLE),
+        "slip_ratio": cells(data.slip_ratio, CELL_RATIO),
+    }
+
+
 def curves_of(found: ForceComparison) -> tuple[Curve, ...]:
     """Return the curves with enough points, the best first."""
     data = found.data
     slip = getattr(data, slip_of(found.quantity))
-    camber = np.round(np.nan_to_num(data.camber) / CELL_ANGLE).astype(np.int64)
-    keys = np.stack([levels(data.load), levels(data.pressure), camber], axis=1)
+    level = set_point_levels(data)
+    keys = np.stack([level[name] for name in ("load", "pressure", "camber")], axis=1)
     several = [np.unique(column).size > 1 for column in keys.T]
     out = []
     for key in np.unique(keys, axis=0):

@@ -14,6 +14,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
+from tirelib.compare.force_curves import set_point_levels
 from tirelib.compare.force_model import force_model_of
 from tirelib.compare.forces import ForceComparison, usable_points
 from tirelib.compare.model import Model
@@ -23,7 +24,7 @@ from tirelib.effects import Effect
 from tirelib.errors import ParameterError, TirelibError
 from tirelib.identify.delay import by_delay
 from tirelib.identify.force_data import force_data
-from tirelib.identify.force_points import force_points
+from tirelib.identify.force_points import force_points, set_points
 from tirelib.identify.random_effects import scales, whitening_of
 from tirelib.identify.span import span
 from tirelib.model.base import coordinates, linearised, operating_points, predict
@@ -70,7 +71,8 @@ def plot_data(
     -------
     Of strain, over runs and `GRID` [deg]: measured, model, difference [ustrain], white (whitened
     residual, in noise), by_gage and measured_by_gage (runs, gages, angles); of forces, over points.
-    `trace_NAME` has the shape of the difference; `fault_NAME` tells why there is none.
+    `level_CONDITION` numbers the set points, so that points within the rig's scatter have one
+    number. `trace_NAME` has the shape of the difference; `fault_NAME` tells why there is none.
 
     Raises
     ------
@@ -124,6 +126,9 @@ def _strain(found: Comparison) -> dict[str, Any]:
         "order": waves.start,
         "load": c["Fz"],
         **{name: QUANTITIES[name].told(c[name]) for name in CONDITIONS},
+        "level_load": set_points(c["Fz"]),
+        "level_pressure": set_points(c["pressure"]),
+        "level_speed": set_points(np.abs(c["speed"])),
         "edges": np.rad2deg(found.prediction.edges),
         "gages": np.array(lateral),
         "measured": 1e6 * found.chosen.strain,
@@ -199,6 +204,7 @@ def _forces(found: ForceComparison) -> dict[str, Any]:
             name: QUANTITIES[name].told(getattr(data, name))
             for name in ("load", "temperature", *CONDITIONS)
         },
+        **{f"level_{name}": number for name, number in set_point_levels(data).items()},
         "measured": found.measured,
         "model": found.predicted,
         "difference": found.difference,

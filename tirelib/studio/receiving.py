@@ -138,10 +138,9 @@ class Receiving:
         place, drawn, files = self.files(number), wish.get("map"), self._read(number)
         if not isinstance(drawn, dict) or files is None:
             raise ParameterError("import: a map and files are needed; drop the files again")
-        order = {"files": files, "map": self._written(place / "map.toml", drawn)}
-        job = self.jobs.add("import", order, {"files": number})
-        text = Path(order["map"]).read_text(encoding="utf-8")
-        return {"job": job.number, "map": order["map"], "text": text}
+        path = self._written(place / "map.toml", drawn)
+        job = self.jobs.add("import", {"files": files, "map": path}, {"files": number})
+        return {"job": job.number, "map": path, "text": Path(path).read_text(encoding="utf-8")}
 
     def _written(self, path: Path, drawn: Mapping[str, Any]) -> str:
         """Write a map as the form has drawn it; return its path."""

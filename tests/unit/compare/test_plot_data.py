@@ -1,5 +1,7 @@
 """What plots are drawn from: arrays of a comparison, and traces that look like the residual."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -9,7 +11,7 @@ import pytest
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
 from tests.unit.force_campaigns import brush_file, steady_runs, write_forces
 from tests.unit.identify.model_waves import TIRE
-from tirelib.campaign import Campaign
+from tirelib.campaign import Campaign, Run
 from tirelib.compare.forces import compare_forces
 from tirelib.compare.model import model_of
 from tirelib.compare.plot_data import plot_data, write_plot_data
@@ -72,3 +74,27 @@ def test_an_unknown_effect_is_refused() -> None:
     found = compare_strain(waves(EFFECT, STRENGTH), model_of(file))
     with pytest.raises(ParameterError, match="--trace nonsense"):
         plot_data(found, cast(Campaign, None), file, [("nonsense", (1.0,))], CATALOGUE)
+
+
+def test_the_scatter_of_a_rig_makes_no_set_points_of_its_own(tmp_path: Path) -> None:
+    def scattered() -> Iterator[Run]:
+        rng = np.random.default_rng(11)
+        for run in steady_runs(loads=(2000.0, 4000.0), repeats=1):
+            rig = {name: values.copy() for name, values in run.rig.items()}
+            rig["Fz"] *= 1.0 + 0.004 * rng.standard_normal()
+            rig["camber"] += np.deg2rad(0.05 * rng.standard_normal())
+            yield replace(run, rig=rig)
+
+    campaign = write_forces(tmp_path / "scattered", scattered(), "scattered")
+    file = brush_file(campaign)
+    data = plot_data(compare_forces(campaign, file, "Fy"), campaign, file, [], CATALOGUE)
+    assert np.unique(data["camber"]).size == 20
+    found = {name[6:]: np.unique(data[name]).size for name in data if name.startswith("level_")}
+    assert found == {
+        "load": 2,
+        "pressure": 1,
+        "speed": 1,
+        "slip_angle": 10,
+        "camber": 1,
+        "slip_ratio": 1,
+    }

@@ -4,20 +4,22 @@ import { number } from "./dom.js";
 export const CONDITIONS = [["load", "load", "N"], ["pressure", "inflation pressure", "bar"], ["speed", "speed", "km/h"], ["slip_angle", "slip angle", "deg"], ["slip_ratio", "slip ratio", "1"], ["camber", "camber", "deg"], ["temperature", "tread temperature", "degC"], ["order", "time order", "s"]];
 export const isStrain = (data) => data.texts.quantity === "strain";
 export const unitOf = (data) => (isStrain(data) ? "microstrain" : data.texts.quantity === "Mz" ? "Nm" : "N");
-const varies = (values) => { let a = Infinity, b = -Infinity; for (const x of values || []) if (Number.isFinite(x)) { a = Math.min(a, x); b = Math.max(b, x); } return b - a > 0.03 * Math.max(Math.abs(a), Math.abs(b)); };
-export const varying = (data) => CONDITIONS.filter(([key]) => data[key] && varies(data[key]));
-export const slipOf = (data) => (data.texts.quantity === "Fx" || (varies(data.slip_ratio) && !varies(data.slip_angle)) ? CONDITIONS[4] : CONDITIONS[3]);
+// Whether a condition has more than one set point; what has no set points varies by more than 3 %.
+function varies(data, key) {
+  if (!data[key]) return false;
+  const level = data[`level_${key}`];
+  if (level) return level.some((x) => x !== level[0]);
+  const values = data[key].filter(Number.isFinite), [low, high] = [values.reduce((a, b) => Math.min(a, b), Infinity), values.reduce((a, b) => Math.max(a, b), -Infinity)];
+  return high - low > 0.03 * Math.max(Math.abs(low), Math.abs(high));
+}
+export const varying = (data) => CONDITIONS.filter(([key]) => varies(data, key));
+export const slipOf = (data) => (data.texts.quantity === "Fx" || (varies(data, "slip_ratio") && !varies(data, "slip_angle")) ? CONDITIONS[4] : CONDITIONS[3]);
 
-// Levels of a condition: a value that lies nearer to the mean of a level than `gap` of the largest belongs to it.
-export function levels(values, gap = 0.06) {
-  const order = [...values.keys()].filter((i) => Number.isFinite(values[i])).sort((a, b) => values[a] - values[b]);
-  const high = Math.max(...order.map((i) => Math.abs(values[i])), 1e-12), out = new Int16Array(values.length).fill(-1), centres = [];
-  let level = -1, last = -Infinity, sum = 0, count = 0;
-  for (const i of order) {
-    if (values[i] - last > gap * high) { level += 1; sum = 0; count = 0; }
-    out[i] = level; sum += values[i]; count += 1; last = centres[level] = sum / count;
-  }
-  return { level: out, centres };
+// The set point of each run or point, as the comparison numbers them, and the mean of each.
+function levels(data, key) {
+  const level = data[`level_${key}`] || data[key], sums = new Map();
+  level.forEach((number, i) => { const [sum, count] = sums.get(number) || [0, 0]; sums.set(number, [sum + data[key][i], count + 1]); });
+  return { level, centres: new Map([...sums].map(([number, [sum, count]]) => [number, sum / count])) };
 }
 
 export function sliced(data, name, row) {
@@ -33,13 +35,13 @@ export function runWords(data, i) {
 // Rows of the map of strain: runs in an order; of forces: levels of the conditions, over bins of slip.
 export function strainRows(data, by, name) {
   const keys = { load: ["load", "pressure", "speed"], pressure: ["pressure", "load", "speed"], speed: ["speed", "load", "pressure"], order: ["order"] }[by];
-  const level = keys.map((key) => (key === "order" ? { level: data.order, centres: null } : levels(data[key])));
+  const level = keys.map((key) => (key === "order" ? { level: data.order } : levels(data, key)));
   const index = [...data.run.keys()].sort((a, b) => level.map((l) => l.level[a] - l.level[b]).find((d) => d) || a - b);
   const lead = level[0];
   let last = null;
   return index.map((i) => {
     const mark = by === "order" ? `run ${data.run[i]}` : lead.level[i];
-    const tick = mark === last ? "" : by === "order" ? mark : `${number(lead.centres[lead.level[i]], 3)} ${CONDITIONS.find(([k]) => k === by)[2]}`;
+    const tick = mark === last ? "" : by === "order" ? mark : `${number(lead.centres.get(lead.level[i]), 3)} ${CONDITIONS.find(([k]) => k === by)[2]}`;
     last = mark;
     return { index: i, label: runWords(data, i), tick, values: sliced(data, name, i), edges: [data.edges[2 * i], data.edges[2 * i + 1]] };
   });
@@ -47,7 +49,7 @@ export function strainRows(data, by, name) {
 
 // A level in words: digits that its neighbours need, and no 1e-4 for zero.
 function rounded(value, centres) {
-  const high = Math.max(...centres.map(Math.abs)), step = 10 ** (Math.floor(Math.log10(high || 1)) - 1);
+  const high = Math.max(...[...centres.values()].map(Math.abs)), step = 10 ** (Math.floor(Math.log10(high || 1)) - 1);
   return number(Math.round(value / step) * step, 4);
 }
 
@@ -61,19 +63,20 @@ export function niceTicks(low, high) {
 export const BINS = 36;
 export function forceRows(data, by, name) {
   const [slipKey, slipName, slipUnit] = slipOf(data);
-  const keys = ["load", "pressure", "camber", "speed"].filter((k) => varies(data[k])).sort((a, b) => (b === by) - (a === by));
-  const found = keys.map((key) => levels(data[key], key === "camber" ? 0.2 : 0.07));
+  const keys = ["load", "pressure", "camber", "speed"].filter((k) => varies(data, k)).sort((a, b) => (b === by) - (a === by));
+  const found = keys.map((key) => levels(data, key));
   const low = Math.min(...data[slipKey]), high = Math.max(...data[slipKey]);
   const groups = new Map();
   for (const i of data.run.keys()) {
-    const key = found.map((f) => String(f.level[i] + 100)).join();
+    const key = found.map((f) => f.level[i]).join();
     if (!groups.has(key)) groups.set(key, []);
     groups.get(key).push(i);
   }
-  const rows = [...groups.entries()].sort(([a], [b]) => (a < b ? -1 : 1)).map(([, members]) => {
+  const order = ([a], [b]) => found.map((f) => f.level[a] - f.level[b]).find((d) => d) || 0;
+  const rows = [...groups.values()].sort(order).map((members) => {
     const sum = new Float32Array(BINS), count = new Uint16Array(BINS);
     for (const i of members) { const k = Math.min(BINS - 1, Math.floor((BINS * (data[slipKey][i] - low)) / (high - low || 1))); sum[k] += data[name][i]; count[k] += 1; }
-    const said = keys.map((key, j) => { const [, , unit] = CONDITIONS.find(([k]) => k === key); return `${rounded(found[j].centres[found[j].level[members[0]]], found[j].centres)} ${unit}`; });
+    const said = keys.map((key, j) => { const [, , unit] = CONDITIONS.find(([k]) => k === key); return `${rounded(found[j].centres.get(found[j].level[members[0]]), found[j].centres)} ${unit}`; });
     return { members, label: said.join(", ") || "all points", tick: said.join(", "), values: sum.map((s, k) => (count[k] ? s / count[k] : NaN)), said };
   });
   return { rows, slip: { key: slipKey, title: `${slipName} [${slipUnit}]`, low, high } };
