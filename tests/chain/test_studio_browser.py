@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -278,6 +278,22 @@ def test_what_is_dropped_is_checked_or_imported(browser: Any, tmp_path: Path) ->
     assert len(runs[1].rig["pressure"]) == 7  # the row of the word is left out
     assert runs[1].rig["pressure"] == pytest.approx(2.1e5)
     assert runs[1].rig["Fz"] == pytest.approx(2000.0)
+
+
+def test_a_diagnosis_that_fails_says_what_can_be_done_next(browser: Any, tmp_path: Path) -> None:
+    with closing(Served(tmp_path)) as served:
+        until(lambda: served.server.started)
+        name = served.do(do="open", path=str(served.measured))[1]["campaign"]
+        until(lambda: "strain/diagnosis.json" in str(served.campaign(name)["models"]))
+        served.do(do="look", campaign=name, model="001", quantity="Fy")
+        page = page_at(browser, f"http://{served.host}/?token={TOKEN}")
+        page.evaluate(f"location.hash = '#/suspect/{name}'")
+        said = page.locator("#ways")
+        said.wait_for()
+        assert "bending: not determined; run at 6 bar" in said.inner_text()
+        said.get_by_role("button", name="strain").click()
+        wait_for(page, "studio.campaign.quantity === 'strain'")
+        page.context.close()
 
 
 HOSTILE = """async target => {

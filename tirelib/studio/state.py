@@ -1,6 +1,6 @@
 """What the page is told of a session: lists for all views, without the documents themselves."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -123,6 +123,18 @@ def progress(desk: Desk) -> list[dict[str, Any]]:
     ]
 
 
+def advice(fit: Mapping[str, Any]) -> list[str]:
+    """Return what a fit says of itself, and what would help with each number left open."""
+    brush = fit.get("brush") or {}
+    said = [*(fit.get("messages") or ()), *(brush.get("notes") or ()), *fit.get("reasons", ())]
+    helps: dict[str, list[str]] = {}
+    for one in [*(fit.get("parameters") or ()), *(brush.get("parameters") or ())]:
+        if "not_identifiable" in (one.get("flags") or ()) and one.get("helps"):
+            run = str(one["helps"]).partition(" (standard deviation")[0]  # differs by number
+            helps.setdefault(run, []).append(str(one["name"]))
+    return said + [f"{', '.join(names)}: not determined; {run}" for run, names in helps.items()]
+
+
 def _model(model: Model, quantity: str) -> dict[str, Any]:
     fit = _part(model.place / "fit.json", _FIT)
     compared = _part(model.document("comparison.json", quantity), _COMPARED)
@@ -131,6 +143,7 @@ def _model(model: Model, quantity: str) -> dict[str, Any]:
         **model.told,
         "ready": model.ready,
         "fit": fit,
+        "advice": advice(_part(model.place / "fit.json", _ADVISES)),
         "error": compared.get("error"),
         "error_unit": compared.get("error_unit"),
         "effects": compared.get("effects", []),
@@ -152,11 +165,13 @@ _FIT = (
     *("effect", "action", "title", "strength", "std", "unit", "range", "in_range", "flags"),
     *("error_before", "error_after", "error_unit", "error_refitted", "floor"),
     *("heldout_error_before", "heldout_error_after", "held_out", "messages", "quantity"),
-    *("error", "reasons", "residual_rms_before", "residual_rms_after", "residual_rms_unit"),
+    *("error", "force_errors"),
+    *("residual_rms_before", "residual_rms_after", "residual_rms_unit"),
 )
+_ADVISES = ("messages", "reasons", "parameters", "brush")
 _COMPARED = ("error", "error_unit", "effects")
 _DIAGNOSED = ("verdict", "named", "floor", "explanation")
-_known: dict[Path, tuple[float, dict[str, Any]]] = {}
+_known: dict[tuple[Path, Sequence[str]], tuple[float, dict[str, Any]]] = {}
 
 
 def _part(path: Path, keys: Sequence[str]) -> dict[str, Any]:
@@ -164,10 +179,11 @@ def _part(path: Path, keys: Sequence[str]) -> dict[str, Any]:
     stamp = _stamp(path)
     if stamp is None:
         return {}
-    if path not in _known or _known[path][0] != stamp:
+    part = path, keys
+    if part not in _known or _known[part][0] != stamp:
         told = read_document(path) or {}
-        _known[path] = stamp, {key: told[key] for key in keys if key in told}
-    return _known[path][1]
+        _known[part] = stamp, {key: told[key] for key in keys if key in told}
+    return _known[part][1]
 
 
 def _stamp(path: Path) -> float | None:

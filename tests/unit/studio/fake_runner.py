@@ -27,7 +27,11 @@ WRITES = {
     "effects": {"effects": [{"effect": "sidewall_load", "stage": "stiffness"}]},
     "check": {"errors": 0, "warnings": 0, "problems": []},
     "show": {"header": {"gage_lateral_mm": [0.0]}, "runs": []},
-    "identify": {"parameters": [1], "error": 15.2, "force_errors": {"Fy": {"error": 3.0}}},
+    "identify": {
+        "parameters": [{"name": "bending", "flags": ["not_identifiable"], "helps": "run at 6 bar"}],
+        "error": 15.2,
+        "force_errors": {"Fy": {"error": 3.0}},
+    },
     "compare": {"error": 15.25, "error_unit": "noise", "effects": []},
     "diagnose": VERDICT,
     "next-test": {"what": "measure", "candidates": []},
@@ -65,7 +69,7 @@ def main() -> int:
             if verb != "add" or not Path(os.environ["HOLD"]).exists():
                 break
             time.sleep(0.02)
-        if "sidewall_pressure" in words:
+        if "sidewall_pressure" in words or (verb == "diagnose" and "Fy" in words):
             err.write("Error: it does not fit; choose another\n")
             return 2
     if target := value(words, "--json"):

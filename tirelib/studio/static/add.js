@@ -1,6 +1,6 @@
 // Step 4: the refit while it runs, the fall of the error, and every model that was made.
 import { compareModels } from "./compare.js";
-import { app, current, nameOf, progressOf, VERDICTS, wish } from "./data.js";
+import { app, current, failedOf, nameOf, progressOf, VERDICTS, wish } from "./data.js";
 import { csvButton, fill, h, number, strength, unitName } from "./dom.js";
 import { Plot, waterfall } from "./plots.js";
 
@@ -9,6 +9,12 @@ const FLAGS = {
   no_gain: "The effect does not lower the error.",
   heldout_worse: "On a part of the runs that was held out the error rose: there the effect may stand for another one.",
 };
+
+// Why there is no verdict of the model yet, or none at all.
+function noVerdict(c) {
+  const broken = failedOf("compare") || failedOf("diagnose");
+  return broken ? h("p", { class: "warn" }, `${broken.title}: ${broken.state}. ${broken.message} `, h("a", { href: `#/suspect/${c.campaign}` }, "What can be done next")) : h("p", { class: "quiet" }, "The verdict of this model is being computed.");
+}
 
 // What was held out, part by part, in a sentence.
 const heldOut = (fit) => (fit.held_out || []).map((part) => `${part.condition.replaceAll("_", " ")} ${number(part.value, 3)} ${part.unit || ""} (${part.runs} runs): ${number(part.error_before, 3)} before, ${number(part.error_after, 3)} after`).join("; ");
@@ -69,7 +75,7 @@ export class Add {
   history(c) {
     const now = current(), unit = unitName(now?.error_unit || now?.fit?.error_unit);
     const failed = c.jobs.filter((job) => ["add", "remove"].includes(job.kind) && ["failed", "cancelled", "interrupted"].includes(job.state)).slice(-3);
-    const key = JSON.stringify([c.models, c.current, failed.map((j) => j.job), this.hidden, c.quantity]);
+    const key = JSON.stringify([c.models, c.current, failed.map((j) => j.job), failedOf("compare")?.job, failedOf("diagnose")?.job, this.hidden, c.quantity]);
     if (key === this.key) return;
     this.key = key;
     const steps = now ? this.steps(c, now) : [];
@@ -79,7 +85,7 @@ export class Add {
     steps.length ? waterfall(steps, unit) : h("p", { class: "quiet" }, "There is no model yet."),
     last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(last.std, 2)}${last.unit === "1" ? "" : ` ${last.unit}`}. Error ${number(last.error_before, 4)} before, `, h("b", { id: "error-after" }, number(last.error_after, 4)), ` after [${unitName(last.error_unit)}]. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after${last.held_out?.length ? `; of it ${heldOut(last)}` : ""}.`) : null,
     last?.flags?.length ? h("p", { class: "warn" }, last.flags.map((flag) => FLAGS[flag] || flag.replaceAll("_", " ")).join(" ")) : null,
-    now?.verdict ? h("p", {}, "The verdict with this model: ", h("b", {}, VERDICTS[now.verdict] || now.verdict), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", h("a", { href: `#/suspect/${app.wanted}` }, "See the suspects again")) : now ? h("p", { class: "quiet" }, "The verdict of this model is being computed.") : null,
+    now?.verdict ? h("p", {}, "The verdict with this model: ", h("b", {}, VERDICTS[now.verdict] || now.verdict), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", h("a", { href: `#/suspect/${app.wanted}` }, "See the suspects again")) : now ? noVerdict(c) : null,
     failed.map((job) => h("p", { class: job.state === "failed" ? "bad" : "warn" }, `${job.kind} ${job.effect}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: job.job }) }, "Run again"))));
     const shown = c.models.filter((m) => m.ready && (this.hidden || !m.hidden));
     fill(this.strip, h("div", { class: "row" }, h("h2", {}, "Models"), h("span", { class: "quiet small" }, "Nothing is deleted. Continue from any of them."), h("span", { class: "room" }),

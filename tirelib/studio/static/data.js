@@ -76,6 +76,12 @@ export const active = () => [...(app.campaign?.jobs || []), ...(app.home?.jobs |
   .filter((job) => ["waiting", "running"].includes(job.state));
 export const progressOf = (number) => app.running.find((one) => one.job === number);
 
+// The last job of a kind on what is looked at, if it has failed or was ended: the user goes on without its result.
+export function failedOf(kind) {
+  const c = app.campaign, last = c.jobs.filter((job) => job.kind === kind && job.subject.model === c.current && job.subject.quantity === c.quantity).at(-1);
+  return last && ["failed", "cancelled"].includes(last.state) ? last : null;
+}
+
 const kept = new Map();
 async function once(key, load) {
   if (!kept.has(key)) {

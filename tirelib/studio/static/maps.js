@@ -63,7 +63,7 @@ export function niceTicks(low, high) {
 export const BINS = 36;
 export function forceRows(data, by, name) {
   const [slipKey, slipName, slipUnit] = slipOf(data);
-  const keys = ["load", "pressure", "camber", "speed"].filter((k) => varies(data, k)).sort((a, b) => (b === by) - (a === by));
+  const keys = ["load", "pressure", "camber", "speed", "slip_angle", "slip_ratio"].filter((k) => k !== slipKey).filter((k) => varies(data, k)).sort((a, b) => (b === by) - (a === by));
   const found = keys.map((key) => levels(data, key));
   const low = Math.min(...data[slipKey]), high = Math.max(...data[slipKey]);
   const groups = new Map();
@@ -76,7 +76,7 @@ export function forceRows(data, by, name) {
   const rows = [...groups.values()].sort(order).map((members) => {
     const sum = new Float32Array(BINS), count = new Uint16Array(BINS);
     for (const i of members) { const k = Math.min(BINS - 1, Math.floor((BINS * (data[slipKey][i] - low)) / (high - low || 1))); sum[k] += data[name][i]; count[k] += 1; }
-    const said = keys.map((key, j) => { const [, , unit] = CONDITIONS.find(([k]) => k === key); return `${rounded(found[j].centres.get(found[j].level[members[0]]), found[j].centres)} ${unit}`; });
+    const said = keys.map((key, j) => { const [, text, unit] = CONDITIONS.find(([k]) => k === key), value = rounded(found[j].centres.get(found[j].level[members[0]]), found[j].centres); return unit === "1" ? `${text} ${value}` : `${value} ${unit}`; });
     return { members, label: said.join(", ") || "all points", tick: said.join(", "), values: sum.map((s, k) => (count[k] ? s / count[k] : NaN)), said };
   });
   return { rows, slip: { key: slipKey, title: `${slipName} [${slipUnit}]`, low, high } };

@@ -27,9 +27,17 @@ export class Field {
     const data = await arraysOf(model, "plots");
     if (!data) return false;
     this.key = key; this.data = data; this.trace = null;
-    if (!isStrain(data) || !["load", "pressure", "speed", "order"].includes(this.by)) this.by = "load";
+    const orders = this.orders(data).map(([k]) => k);
+    if (!orders.includes(this.by)) [this.by] = orders;
     this.build();
     return true;
+  }
+
+  // What rows can be sorted by: conditions that vary, without the slip that the map goes over.
+  orders(data) {
+    if (isStrain(data)) return [["load", "load"], ["pressure", "pressure"], ["speed", "speed"], ["order", "time order"]];
+    const [slip] = slipOf(data), found = varying(data).filter(([k]) => k !== slip && !["temperature", "order"].includes(k)).map(([k, text]) => [k, text]);
+    return found.length ? found : [["load", "load"]];
   }
 
   build() {
@@ -50,11 +58,9 @@ export class Field {
     this.limit = limitOf(data[this.value]);
     this.heat.at.row = this.row;
     this.heat.show({ columns: this.columns, rows: this.rows, x: this.x, unit: this.unit, limit: this.limit, say: (r, c) => this.cell(r, c) });
-    const has = varying(data).map(([key, text]) => [key, text]);
-    const orders = strain ? [["load", "load"], ["pressure", "pressure"], ["speed", "speed"], ["order", "time order"]] : has.filter(([k]) => ["load", "pressure", "camber", "speed"].includes(k));
     const known = data.white.some(Number.isFinite);
     fill(this.controls, h("h2", {}, this.trace ? `What ${this.trace.name} would leave [${this.unit}]` : `What is left [${this.unit}]`), h("span", { class: "room" }),
-      choose(orders.length ? orders : [["load", "load"]], this.by, (by) => { this.by = by; this.build(); this.detail(); }, "rows by"),
+      choose(this.orders(data), this.by, (by) => { this.by = by; this.build(); this.detail(); }, "rows by"),
       choose(Object.entries(VALUES).filter(([k]) => k !== "white" || known), this.value, (v) => { this.value = v; this.build(); this.detail(); }, "values"),
       choose([["diverging", "blue and red"], ["cividis", "dark to light"]], this.heat.colors, (c) => { this.heat.colors = c; this.heat.image = null; this.heat.draw(); }, "colours"),
       csvButton("map", () => [["row", this.rows.map((r) => r.label)], ...Array.from({ length: this.columns }, (_, k) => [number(this.x.low + ((k + (strain ? 0 : 0.5)) * (this.x.high - this.x.low)) / this.columns, 5), this.rows.map((r) => r.values[k])])]));
@@ -200,5 +206,18 @@ export function wait(place, kinds = ["check", "identify", "compare"]) {
   fill(place, h("h2", {}, running.length ? "Being computed" : broken ? "It could not be computed" : "Nothing to be seen yet"),
     c.check?.errors ? h("p", { class: "bad" }, `The campaign has ${c.check.errors} errors; they stand in step 1 with what to do.`) : null,
     running.map((job) => { const at = progressOf(job.job); return h("p", {}, `${job.title}: ${job.state === "running" ? at?.label || "begins" : "waits"}`); }),
-    !running.length && broken ? h("p", { class: "bad" }, `${broken.title}: ${broken.state}. ${broken.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: broken.job }) }, "Run again")) : null);
+    !running.length && broken ? [h("p", { class: "bad" }, `${broken.title}: ${broken.state}. ${broken.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: broken.job }) }, "Run again")), ways(c, model)] : null);
+}
+
+// What can be done where a step of the way has failed: other quantities, where the model fails, what the fit says.
+export function ways(c, model) {
+  if (!model) return null;
+  const base = c.models.find((m) => m.parent === null && m.ready), errors = base?.fit?.force_errors || {}, advice = base?.advice || [];
+  const others = c.quantities.filter((q) => q !== c.quantity), told = (q) => (errors[q]?.error ? `, error ${number(errors[q].error)} ${unitName(errors[q].error_unit)}` : "");
+  return h("div", { id: "ways" }, h("h3", {}, "What can be done next"),
+    h("ul", {},
+      others.length ? h("li", {}, "Look at another quantity: ", others.map((q) => h("button", { class: "small", type: "button", "data-quantity": q, onclick: () => wish({ do: "look", campaign: c.campaign, model: model.number, quantity: q }) }, `${q}${told(q)}`))) : null,
+      model.documents[`${c.quantity}/plots.npz`] ? h("li", {}, h("a", { href: `#/see/${c.campaign}` }, "See where the model fails"), ", and in words what a fit as poor as this one may come from: a unit, a sign, another tire, a run that went wrong.") : null,
+      c.models.length > 1 ? h("li", {}, h("a", { href: `#/add/${c.campaign}` }, "Continue from another model"), " of the history.") : null,
+      advice.length ? h("li", {}, "Do what the fit of the base model says and advises:", h("ul", {}, advice.map((said) => h("li", {}, said)))) : null));
 }

@@ -94,18 +94,17 @@ onDrag("drop", async (event) => {
 });
 
 let first = true;
-const told = new Set();
+const begun = Date.now() / 1000, told = new Set(); // what had failed before is no news
 listen((what) => {
   if (what === "link") document.getElementById("link").textContent = app.connected ? "connected" : "The server does not answer; nothing is lost. Start tirelib studio again.";
   if (what === "progress") { jobs(); view?.progress?.(); }
   if (what !== "state") return;
   if (first) {
     first = false;
-    for (const job of [...(app.campaign?.jobs || []), ...app.home.jobs]) told.add(job.job);
     if (app.home.first && !address().campaign) { go("see", app.home.first); return; }
   }
   for (const job of [...(app.campaign?.jobs || []), ...app.home.jobs]) {
-    if (job.state === "failed" && !told.has(job.job)) { told.add(job.job); toast(`${job.title}: ${job.message}`, true); }
+    if (job.state === "failed" && job.ended > begun && !told.has(job.job)) { told.add(job.job); toast(`${job.title}: ${job.message}`, true); }
   }
   if (app.follow && app.home) {
     const found = app.home.jobs.find((job) => job.job === app.follow);

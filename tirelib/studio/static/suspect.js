@@ -1,5 +1,5 @@
 // Step 3: which effect is missing: the verdict in four lines, the effects by part, the trace of each.
-import { app, arraysOf, current, documentOf, VERDICTS, wish } from "./data.js";
+import { app, arraysOf, current, documentOf, failedOf, VERDICTS, wish } from "./data.js";
 import { fill, h, number, strength, toast, unitName } from "./dom.js";
 import { effectPage } from "./effect.js";
 import { Plot } from "./plots.js";
@@ -7,6 +7,7 @@ import { Field, wait } from "./see.js";
 import { CONDITIONS, isStrain, sliced, unitOf } from "./maps.js";
 
 const TITLES = { missing: "What is missing", sure: "How sure", error: "The error", next: "What to do next" };
+const KINDS = ["check", "identify", "compare", "diagnose"];
 const ORDER = ["belt", "sidewall", "tread", "contact", "gages", "rig"];
 
 export class Suspect {
@@ -22,20 +23,39 @@ export class Suspect {
   }
 
   leave() { this.plot.remove(); this.field.curve.remove(); this.field.rest.remove(); }
-  progress() { if (this.body.hidden) wait(this.head, ["check", "identify", "compare", "diagnose"]); }
+  progress() { if (this.body.hidden) wait(this.head, KINDS); }
 
   async update() {
     const model = current();
     const told = model && (await documentOf(model, "diagnosis").catch(() => null));
-    if (!told || !(await this.field.load(model).catch(() => false))) { this.body.hidden = true; this.key = ""; wait(this.head, ["check", "identify", "compare", "diagnose"]); return; }
+    const loaded = model && (await this.field.load(model).catch(() => false));
+    if (!told || !loaded) {
+      this.key = "";
+      wait(this.head, KINDS);
+      this.body.hidden = !loaded || !failedOf("diagnose");
+      if (!this.body.hidden) this.byHand(model);
+      return;
+    }
     const key = JSON.stringify([app.campaign.campaign, model.number, app.campaign.quantity, Object.entries(model.documents).filter(([file]) => !file.endsWith("planted.npz")), app.home.effects.length]);
     if (key === this.key) return;
-    this.key = key; this.body.hidden = false; this.told = told; this.model = model; this.hovered = "";
+    this.key = key; this.body.hidden = false; this.list.dataset.key = ""; this.told = told; this.model = model; this.hovered = "";
     this.traces = await arraysOf(model, "traces").catch(() => null);
     this.next = await documentOf(model, "next-test").catch(() => null);
     this.ticked = new Set([...this.ticked].filter((name) => told.candidates.some((e) => e.effect === name)));
     this.say();
     this.table();
+    this.draw();
+  }
+
+  // The effects of the catalogue without a verdict: what is ticked is fitted all the same.
+  byHand(model) {
+    const key = `by hand ${app.campaign.campaign}/${model.number}/${app.campaign.quantity}`, forces = app.campaign.quantity !== "strain";
+    if (this.list.dataset.key === key) return;
+    const effects = app.home.effects.filter((e) => (e.stage === "brush") === forces && !(model.effects || []).some((own) => own.effect === e.effect)).map((e) => ({ ...e, twins: [] }));
+    this.model = model; this.traces = null; this.hovered = "";
+    this.told = { candidates: [], dead: [], named: [], byHand: effects };
+    this.table();
+    this.list.dataset.key = key;
     this.draw();
   }
 
@@ -72,24 +92,31 @@ export class Suspect {
     const groups = new Map(ORDER.map((part) => [part, []]));
     const put = (row, name) => (groups.get(known.get(name)?.part || "rig") || groups.get("rig")).push(row);
     for (const e of told.candidates) put(this.candidate(e), e.effect);
+    for (const e of told.byHand || []) put(h("tr", { "data-name": e.effect }, h("td", {}, this.tick(e)), h("td", { colspan: 5 }, this.named(e), h("div", { class: "small quiet" }, e.title))), e.effect);
     for (const e of model.effects || []) put(this.owned(e), e.effect);
     for (const name of told.dead) put(this.dead(name, (told.dead_reasons || {})[name]), name);
     const withP = told.candidates.some((e) => e.p !== undefined && e.p !== null);
     const rank = (part) => Math.min(...groups.get(part).map((r) => Number(r.dataset.rank || 999)), 999);
-    fill(this.list, h("div", { class: "row" }, h("h2", {}, "Effects"), h("span", { class: "quiet small" }, "Hover or focus a line to see what the effect would leave; tick what to add."), h("span", { class: "room" }),
+    fill(this.list, h("div", { class: "row" }, h("h2", {}, "Effects"), h("span", { class: "quiet small" }, told.byHand ? "There is no verdict: tick what you suspect, and the fit tells what it takes away." : "Hover or focus a line to see what the effect would leave; tick what to add."), h("span", { class: "room" }),
       this.button = h("button", { class: "main", type: "button", id: "add", onclick: () => this.add() }, "Add")),
-    h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n" }, withP ? "p" : "score / threshold"), h("th", { title: "± one standard deviation" }, "strength"), h("th", { class: "n", title: `error with this effect, ${unitName(told.error_unit)}` }, "error with it"), h("th", { class: "n", title: "chance that a diagnosis of this plan finds the effect at this strength" }, "chance to find it"))),
+    h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, told.byHand ? null : h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n" }, withP ? "p" : "score / threshold"), h("th", { title: "± one standard deviation" }, "strength"), h("th", { class: "n", title: `error with this effect, ${unitName(told.error_unit)}` }, "error with it"), h("th", { class: "n", title: "chance that a diagnosis of this plan finds the effect at this strength" }, "chance to find it"))),
       h("tbody", {}, [...groups.keys()].filter((part) => groups.get(part).length).sort((a, b) => rank(a) - rank(b)).map((part) => [h("tr", { class: "part" }, h("td", { colspan: 6 }, part)), ...groups.get(part).sort((a, b) => Number(a.dataset.rank || 999) - Number(b.dataset.rank || 999))])))));
     this.count();
   }
 
+  tick(e) {
+    const box = h("input", { type: "checkbox", "aria-label": `tick ${e.effect}`, "data-effect": e.effect, checked: this.ticked.has(e.effect), onchange: () => { if (box.checked) this.ticked.add(e.effect); else this.ticked.delete(e.effect); this.count(); } });
+    return box;
+  }
+
+  named(e, fitted = null) { return h("button", { class: "small", type: "button", title: "What it is, its source, what it would look like here", onclick: () => effectPage(e.effect, fitted, this) }, e.effect); }
+
   candidate(e) {
     const { told } = this, sets = (told.sets || []).flatMap((set, i) => (set.includes(e.effect) ? [i + 1] : []));
-    const box = h("input", { type: "checkbox", "aria-label": `tick ${e.effect}`, "data-effect": e.effect, checked: this.ticked.has(e.effect), onchange: () => { if (box.checked) this.ticked.add(e.effect); else this.ticked.delete(e.effect); this.count(); } });
     const on = () => this.hover(e.effect);
     return h("tr", { "data-rank": e.rank, "data-name": e.effect, onmouseenter: on, onfocusin: on },
-      h("td", {}, box),
-      h("td", {}, h("button", { class: "small", type: "button", title: "What it is, its source, what it would look like here", onclick: () => effectPage(e.effect, e, this) }, e.effect), " ", told.named.includes(e.effect) ? h("span", { class: "tag alarm" }, "named") : e.level !== "quiet" ? h("span", { class: "tag" }, e.level) : null,
+      h("td", {}, this.tick(e)),
+      h("td", {}, this.named(e, e), " ", told.named.includes(e.effect) ? h("span", { class: "tag alarm" }, "named") : e.level !== "quiet" ? h("span", { class: "tag" }, e.level) : null,
         h("div", { class: "small quiet" }, this.title(e.effect)?.title || e.title || "", e.twins.length ? ` Looks like ${e.twins.map((t) => `${t.effect} (${number(t.angle_deg, 2)} deg apart)`).join(", ")}.` : "", sets.length ? ` In set ${sets.join(", ")}.` : "")),
       h("td", { class: "n" }, e.p !== undefined && e.p !== null ? [number(e.p, 2), e.p_std ? h("div", { class: "small quiet" }, `± ${number(e.p_std, 1)}`) : null] : number(e.score / e.threshold, 3)),
       h("td", {}, `${strength(e.strength)} ± ${strength(e.std, 2)} ${e.unit === "1" ? "" : e.unit}`, e.in_range ? null : h("div", { class: "small warn" }, `outside the plausible ${(e.range || []).map((x) => number(x)).join(" to ")}`)),
@@ -104,7 +131,7 @@ export class Suspect {
   }
 
   dead(name, why) {
-    return h("tr", { class: "dead", "data-rank": 900 }, h("td", {}, "–"), h("td", {}, h("button", { class: "small", type: "button", onclick: () => effectPage(name, null, this) }, name), h("div", { class: "small" }, this.title(name)?.title || "")), h("td", { colspan: 4, class: "small" }, `This plan cannot show it: ${why || "it changes nothing here"}`));
+    return h("tr", { class: "dead", "data-rank": 900 }, h("td", {}, "–"), h("td", {}, this.named({ effect: name }), h("div", { class: "small" }, this.title(name)?.title || "")), h("td", { colspan: 4, class: "small" }, `This plan cannot show it: ${why || "it changes nothing here"}`));
   }
 
   count() { this.button.textContent = this.ticked.size ? `Add ${[...this.ticked].join(", ")}` : "Add what is ticked"; this.button.disabled = !this.ticked.size; }
@@ -132,7 +159,7 @@ export class Suspect {
     if (!data) return;
     const begun = performance.now(), row = this.field.rows[this.field.row], name = this.hovered;
     const trace = name && this.traces?.[`trace_${name}`], fault = name && this.traces?.texts[`fault_${name}`];
-    const title = !name ? "hover an effect to see what it would leave" : fault ? `${name}: ${fault}` : trace ? `the residual, and what ${name} would leave at its fitted strength` : this.traces ? `${name}: no trace` : "the traces of the effects are being computed";
+    const title = this.told?.byHand ? "what is left; the page of an effect plants it" : !name ? "hover an effect to see what it would leave" : fault ? `${name}: ${fault}` : trace ? `the residual, and what ${name} would leave at its fitted strength` : this.traces ? `${name}: no trace` : "the traces of the effects are being computed";
     const points = !isStrain(data);
     let x, rest, own;
     if (points) {
