@@ -1,6 +1,6 @@
 """A diagnosis with what its reader needs: floor, held-out errors, what is left; as JSON."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,68 +12,37 @@ from tirelib.diagnose.diagnose import Diagnosis, Finding
 from tirelib.diagnose.fitted import Fitted
 from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.guess import Guess
-from tirelib.diagnose.held_out import Fold, fold_entry, pooled
 from tirelib.diagnose.left import Left, left_of, told_powers
-from tirelib.diagnose.told import candidate_told, verdict_told
+from tirelib.diagnose.told import Assessed, listed, next_step
 from tirelib.errors import TirelibError
 
-FORMAT = "tirelib-diagnosis/1"
 NO_REPEATS = (
     "no runs were repeated at equal set points, so the noise is unknown: errors are in "
     "microstrain, no effect is named and none is more than a hint; repeat some runs"
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Assessment:
-    """A diagnosis as it is told.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Assessment(Assessed):
+    """A diagnosis of strain as it is told; without folds if nothing is named.
 
     Attributes
     ----------
     given : Model
         The model that was diagnosed, as its file has it.
-    diagnosis : Diagnosis
-    verdict : str
-    named : tuple of str
-        Empty without repeats.
-    findings : tuple of Finding
-        At most hints without repeats.
     before, refitted, after : ModelError
         Of the model as it is given, with the numbers of the least error, and with the named
         effects.
-    floor : float
-        Part of `after` that noise and what plain tires show explain.
-    folds : tuple of Fold
-        Empty if nothing is named.
-    singles : mapping of name to Fitted
-        The model with one named effect alone, where that can be fitted.
     left : Left
         What no effect explains.
-    messages : tuple of str
     """
 
-    given: Model
     diagnosis: Diagnosis
-    verdict: str
-    named: tuple[str, ...]
-    findings: tuple[Finding, ...]
+    given: Model
     before: ModelError
     refitted: ModelError
     after: ModelError
-    floor: float
-    folds: tuple[Fold, ...]
-    singles: Mapping[str, Fitted]
     left: Left
-    messages: tuple[str, ...]
-
-    @property
-    def final(self) -> Fitted:
-        """The model with the named effects."""
-        return self.diagnosis.final if self.named else self.diagnosis.base
-
-    def held_out(self, fit: Fitted | None) -> tuple[float, ...]:
-        """Return the errors of a model on each fold's runs; none without folds, or a model."""
-        return self.diagnosis.models.held_out(fit) if self.folds and fit is not None else ()
 
     def error_with(self, finding: Finding) -> float:
         """Return the error with one effect alone, to first order unless it is the one named."""
@@ -115,19 +84,19 @@ def assess(found: Diagnosis, given: Model) -> Assessment:
         if finding.effect.name in named and not finding.in_range
     ]
     return Assessment(
-        given,
-        found,
-        verdict,
-        named,
-        findings,
-        before,
-        refitted,
-        after,
-        floor,
-        chosen,
-        singles,
-        _left(found, final),
-        tuple(messages),
+        diagnosis=found,
+        verdict=verdict,
+        named=named,
+        findings=findings,
+        floor=floor,
+        folds=chosen,
+        singles=singles,
+        messages=tuple(messages),
+        given=given,
+        before=before,
+        refitted=refitted,
+        after=after,
+        left=_left(found, final),
     )
 
 
@@ -155,44 +124,17 @@ def _with_one(found: Diagnosis, name: str) -> Fitted | None:
 
 def diagnosis_document(told: Assessment) -> dict[str, Any]:
     """Return the numbers as ``tirelib-diagnosis/1``; strains in microstrain, angles in deg."""
-    found = told.diagnosis
-    held_before, held_final = told.held_out(found.base), told.held_out(told.final)
     return {
-        "format": FORMAT,
-        "campaign": found.runs.waves.header.name,
-        "axes": "iso",
+        **told.shared,
+        "campaign": told.diagnosis.runs.waves.header.name,
         "quantity": "strain",
         "unit": "ustrain",
         **named_errors(told.before, told.after),
         "error_refitted": told.refitted.value,
-        "repeats": found.runs.noise.repeats,
-        "floor": told.floor,
-        "heldout_error_before": pooled(held_before, told.folds),
-        "heldout_error_after": pooled(held_final, told.folds),
-        "held_out": [
-            fold_entry(fold, before, after)
-            for fold, before, after in zip(told.folds, held_before, held_final, strict=True)
-        ],
+        "repeats": told.diagnosis.runs.noise.repeats,
         "delay_us": 1e6 * told.after.delay,
-        "verdict": told.verdict,
-        "named": list(told.named),
-        "sets": [list(names) for names in found.verdict.sets] if told.named else [],
-        **verdict_told(found.verdict),
-        "has": [effect.name for effect in found.base.effects],
-        "candidates": [
-            candidate_told(
-                finding,
-                rank,
-                told.error_with(finding),
-                pooled(told.held_out(told.singles.get(finding.effect.name)), told.folds),
-            )
-            for rank, finding in enumerate(told.findings, start=1)
-        ],
-        "dead": list(found.dead),
-        "dead_reasons": dict(found.dead),
         "unexplained": _unexplained(told),
         "next_test": next_test(told),
-        "messages": list(told.messages),
     }
 
 
@@ -269,40 +211,39 @@ def _guess(guess: Guess) -> dict[str, Any]:
     }
 
 
+def _and(names: Sequence[str]) -> str:
+    return listed(names, "load, pressure and speed")
+
+
 def next_test(told: Assessment) -> dict[str, Any]:
     """Return what to do or to measure next, and why."""
     by_name = {finding.effect.name: finding.effect for finding in told.findings}
-    dead = told.diagnosis.dead
-    lacking = {name: reason for name, reason in dead.items() if reason.startswith("no run has")}
     varies = [set(by_name[name].varies_with) for name in told.named]
     every = {name for names in varies for name in names}
     common = {name for name in every if all(name in names for names in varies)}
-    between: list[str] = []
-    if told.verdict == "indistinguishable":
-        between = list(told.named)
+    named = told.named
+
+    def parting() -> str:
         differ = sorted(every - common) or sorted(every)
-        what = f"more levels of {_and(differ)}, to the ends that the rig allows: there " + (
-            f"{_and(between)} part" if len(between) > 1 else "it shows"
+        return f"more levels of {_and(differ)}, to the ends that the rig allows: there " + (
+            f"{_and(named)} part" if len(named) > 1 else "it shows"
         )
-    elif told.verdict == "form_inadequate":
-        what = (
-            f"{_and(told.named)} is needed but its law does not fit: more levels of "
+
+    words = {
+        "indistinguishable": parting,
+        "form_inadequate": lambda: (
+            f"{_and(named)} is needed but its law does not fit: more levels of "
             f"{_and(sorted(every))} would show the right law"
-        )
-    elif told.verdict == "named":
-        what = f"add {told.named[0]} (`tirelib add {told.named[0]}`) and diagnose again"
-    elif told.verdict == "unknown":
-        what = (
+        ),
+        "unknown": lambda: (
             f"the misfit stands {told.left.where}; it {told.left.scaling}: more levels there, or "
             "an effect of your own (--effects)"
+        ),
+    }
+    if not told.after.known:
+        words["none"] = lambda: (
+            "repeat some runs at equal set points, best at the ends of load, pressure and speed"
         )
-    elif not told.after.known:
-        what = "repeat some runs at equal set points, best at the ends of load, pressure and speed"
-    else:
-        what = "none is needed for the effects that this plan can show"
-    return {"what": what, "between": between, "would_revive": lacking}
-
-
-def _and(names: Sequence[str]) -> str:
-    words = list(names) or ["load, pressure and speed"]
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+    dead = told.diagnosis.dead.items()
+    lacking = {name: reason for name, reason in dead if reason.startswith("no run has")}
+    return next_step(told, words, lacking)

@@ -1,4 +1,4 @@
-"""Errors on runs that took no part in a fit: the highest load, and one pressure."""
+"""Errors on what took no part in a fit; of strain: on runs of the highest load, of one pressure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,22 +18,36 @@ from tirelib.quantities import QUANTITIES
 LEAST_LOADS, LEAST_PRESSURES = 3, 2
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Fold:
-    """Runs that are left out of a fit.
+    """Runs of strain, or points of a force, that are left out of a fit.
 
     Attributes
     ----------
     name : str
-        Condition, load or pressure.
+        time, cell, or a condition.
     value : float
-        Mean of the left-out runs, [N] or [Pa].
-    out : shape (n_runs,)
+        Mean of the condition there, SI; number of the part for time and cell.
+    out : shape (n,)
+    main : bool
+        Whether it counts in the held-out error.
+    of : str
+        runs or points.
     """
 
     name: str
     value: float
     out: BoolArray
+    main: bool = True
+    of: str = "runs"
+
+    @property
+    def told(self) -> tuple[float, str]:
+        """What its runs have in common, with its unit; parts of time by their number."""
+        if self.name in ("time", "cell"):
+            return self.value + 1.0, "1"
+        known = QUANTITIES[self.name]
+        return float(known.told(self.value)), known.unit
 
 
 def folds(data: Data) -> tuple[Fold, ...]:
@@ -80,21 +94,25 @@ def values_of_errors(errors: Sequence[ModelError | None]) -> tuple[float, ...]:
 
 
 def fold_entry(fold: Fold, before: float, after: float) -> dict[str, Any]:
-    """Return a left-out part with its errors as documents tell them."""
-    known = QUANTITIES[fold.name]
+    """Return what is left out with its errors as documents tell them."""
+    value, unit = fold.told
     return {
         "condition": fold.name,
-        "value": float(known.told(fold.value)),
-        "unit": known.unit,
-        "runs": int(fold.out.sum()),
+        "value": value,
+        "unit": unit,
+        fold.of: int(fold.out.sum()),
+        **({"counted": fold.main} if fold.of == "points" else {}),
         "error_before": before,
         "error_after": after,
     }
 
 
-def pooled(errors: Sequence[float], chosen: Sequence[Fold]) -> float:
-    """Return the rms over all left-out runs; NaN where a fold has none."""
-    if not errors or not np.isfinite(errors).all():
+def pooled(errors: Sequence[float], folds: Sequence[Fold]) -> float:
+    """Return the rms over the folds that count; NaN if there is none, or one has no error."""
+    if not errors:
         return float("nan")
-    weights = np.array([int(fold.out.sum()) for fold in chosen], dtype=float)
-    return float(np.sqrt(np.average(np.square(errors), weights=weights)))
+    counted = [(e, int(f.out.sum())) for e, f in zip(errors, folds, strict=True) if f.main]
+    if not counted or not all(np.isfinite(e) for e, _ in counted):
+        return float("nan")
+    values, weights = np.array(counted).T
+    return float(np.sqrt(np.average(values**2, weights=weights)))

@@ -1,12 +1,127 @@
-"""What the documents of a diagnosis tell alike of strain and of forces."""
+"""A diagnosis as it is told, of strain or of forces, and what the documents of both hold alike."""
 
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.diagnose import Finding
+from tirelib.diagnose.held_out import Fold, fold_entry, pooled
 from tirelib.infer.select import Verdict
+
+FORMAT = "tirelib-diagnosis/1"
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Assessed:
+    """A diagnosis as it is told.
+
+    Attributes
+    ----------
+    diagnosis : Diagnosis or ForceDiagnosis
+    verdict : str
+    named : tuple of str
+        Empty without repeats.
+    findings : tuple of Finding
+        At most hints without repeats.
+    floor : float
+        Part of the error with the named effects that noise and what plain tires show explain.
+    folds : tuple of Fold
+        What is left out in turn.
+    singles : mapping of name to fit
+        The model with one named effect alone, where that can be fitted.
+    messages : tuple of str
+    """
+
+    diagnosis: Any
+    verdict: str
+    named: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    floor: float
+    folds: tuple[Fold, ...]
+    singles: Mapping[str, Any]
+    messages: tuple[str, ...]
+
+    @property
+    def final(self) -> Any:
+        """The model with the named effects."""
+        return self.diagnosis.final if self.named else self.diagnosis.base
+
+    @property
+    def factor(self) -> float:
+        """By which errors on what was held out become errors as they are told."""
+        return 1.0
+
+    def held_out(self, fit: Any) -> tuple[float, ...]:
+        """Return the errors of a model on each fold; none without folds, or a model."""
+        if not self.folds or fit is None:
+            return ()
+        return tuple(self.factor * error for error in self.diagnosis.models.held_out(fit))
+
+    def error_with(self, finding: Finding) -> float:
+        """Return the error with one effect alone, to first order unless it is named."""
+        raise NotImplementedError
+
+    @property
+    def shared(self) -> dict[str, Any]:
+        """The keys that documents of strain and of forces share."""
+        found, verdict = self.diagnosis, self.diagnosis.verdict
+        before, after = self.held_out(found.base), self.held_out(self.final)
+        return {
+            "format": FORMAT,
+            "axes": "iso",
+            "floor": self.floor,
+            "heldout_error_before": pooled(before, self.folds),
+            "heldout_error_after": pooled(after, self.folds),
+            "held_out": [fold_entry(*each) for each in zip(self.folds, before, after, strict=True)],
+            "verdict": self.verdict,
+            "named": list(self.named),
+            "sets": [list(names) for names in verdict.sets] if self.named else [],
+            **verdict_told(verdict),
+            "has": [effect.name for effect in found.base.effects],
+            "candidates": [
+                candidate_told(
+                    finding,
+                    rank,
+                    self.error_with(finding),
+                    pooled(self.held_out(self.singles.get(finding.effect.name)), self.folds),
+                )
+                for rank, finding in enumerate(self.findings, start=1)
+            ],
+            "dead": list(found.dead),
+            "dead_reasons": dict(found.dead),
+            "messages": list(self.messages),
+        }
+
+
+def next_step(
+    told: Any, words: Mapping[str, Callable[[], str]], lacking: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return what to do or to measure next, and why.
+
+    Parameters
+    ----------
+    told : Assessed
+    words : mapping of verdict to callable
+        What to do after the verdicts that strain and forces answer in their own words.
+    lacking : mapping of name to reason
+        Effects that other runs would show.
+    """
+    said = {
+        "none": lambda: "none is needed for the effects that this plan can show",
+        "named": lambda: f"add {told.named[0]} (`tirelib add {told.named[0]}`) and diagnose again",
+        **words,
+    }
+    between = list(told.named) if told.verdict == "indistinguishable" else []
+    return {"what": said[told.verdict](), "between": between, "would_revive": dict(lacking)}
+
+
+def listed(names: Sequence[str], none: str) -> str:
+    """Return names as words of a sentence."""
+    words = list(names) or [none]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def verdict_told(found: Verdict) -> dict[str, Any]:

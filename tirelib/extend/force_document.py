@@ -3,8 +3,7 @@
 from typing import Any
 
 from tirelib.compare.forces import UNITS
-from tirelib.diagnose.forces.document import fold_entry
-from tirelib.diagnose.forces.held_out import pooled
+from tirelib.diagnose.held_out import fold_entry, pooled
 from tirelib.extend.document import step_document
 from tirelib.extend.force_extension import ForceExtension
 from tirelib.extend.model_file import history_entry, refuse_beyond, stepped

@@ -6,11 +6,12 @@ What differs is how a model is fitted to its campaign, what its floor is and wha
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
+from tirelib.diagnose.held_out import Fold
 from tirelib.effects import Effect
 from tirelib.errors import CalibrationError, ParameterError
 
@@ -44,7 +45,7 @@ class Models(Protocol[F]):
     """A model on a campaign, and others about it, each fitted once."""
 
     @property
-    def folds(self) -> Sequence[Any]:
+    def folds(self) -> Sequence[Fold]:
         """What can be left out of a fit in turn."""
 
     def at(self) -> F:
@@ -92,7 +93,7 @@ class Step(Generic[F]):
     before: F
     after: F
     floor: float
-    folds: tuple[Any, ...]
+    folds: tuple[Fold, ...]
     held_before: tuple[float, ...]
     held_after: tuple[float, ...]
     flags: tuple[str, ...]
@@ -181,7 +182,7 @@ def _judged(
     counted = [
         new > old
         for new, old, fold in zip(held_after, held_before, folds, strict=True)
-        if getattr(fold, "main", True)
+        if fold.main
     ]
     if any(counted):
         flags.append("heldout_worse")

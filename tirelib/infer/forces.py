@@ -125,10 +125,7 @@ class ForceProblem:
         self.bench, self.quantity, self.values = bench, quantity, dict(values)
         self.measured: FloatArray = getattr(bench.points.data, quantity)
         load = bench.conditions.load
-        out = OF_CONTACT if bench.half is not None else ()
-        if load.max() < LOAD_RATIO * load.min():
-            out = (*out, "load_power")
-        self.names = tuple(name for name in COORDINATES[quantity] if name not in out)
+        self.names = fitted_constants(bench, quantity)
         self.start = Point(np.zeros(len(self.names)), tuple(effects), tuple(strengths))
         self.widths = np.full(len(self.names), WIDTH)
         self.ends = -np.full(len(self.names), np.inf), np.full(len(self.names), np.inf)
@@ -138,7 +135,7 @@ class ForceProblem:
         self.dead: dict[str, str] = {}
         self._whiteners: dict[float, PointWhitener] = {}
         solved = self.solve(self.start)
-        self.slip = self._slip(solved.state)
+        self.slip = slip_of(solved.state, quantity)
         self._tangent = self._by_set_points(solved)
         self._base = np.linalg.qr((self.slopes(Point(self.start.base), solved) / self.size).T)[0]
         self.living = self._alive(catalogue, solved)
@@ -157,11 +154,7 @@ class ForceProblem:
 
     def constants(self, point: Point) -> dict[str, float]:
         """Return the brush's constants at a point."""
-        out = dict(self.values)
-        for name, move in zip(self.names, point.base, strict=True):
-            spec, old = SPECS[name], out.get(name, 0.0)
-            out[name] = old * float(np.exp(move)) if spec.log else old + spec.size * float(move)
-        return out
+        return moved_constants(self.values, self.names, point.base)
 
     def about(self, solved: ForceSolved) -> "ForceProblem":
         """Return the problem: its whitening stays about the given model."""
@@ -259,14 +252,6 @@ class ForceProblem:
         found = {name: f for name, f in every.items() if varies(at, name) and np.ptp(f) > 0.0}
         return found | {"order": 2.0 * at.order - 1.0}
 
-    def _slip(self, state: BrushState) -> FloatArray:
-        """Return signed slip as C slip / (mu Fz): from 3 on the whole contact slides."""
-        slip, stiffness = np.tan(state.slip_angle), state.c_py
-        if self.quantity == "Fx":
-            slip, stiffness = state.slip_ratio, state.c_px
-        out: FloatArray = 2.0 * stiffness * state.a**2 * slip / (state.mu * state.conditions.load)
-        return out
-
     def _by_set_points(self, solved: ForceSolved) -> FloatArray:
         """Return the change of the force by one standard deviation of each condition, (n, 4)."""
         at, points, columns = self.bench.conditions, self.bench.points, []
@@ -325,6 +310,35 @@ class ForceProblem:
         return "the brush's own parameters change the force alike at these conditions" + one_way * (
             effect.name == "ply_steer"
         )
+
+
+def fitted_constants(bench: ForceBench, quantity: str) -> tuple[str, ...]:
+    """Return the constants of the brush that points of a force can fit."""
+    load = bench.conditions.load
+    out = OF_CONTACT if bench.half is not None else ()
+    if load.max() < LOAD_RATIO * load.min():
+        out = (*out, "load_power")
+    return tuple(name for name in COORDINATES[quantity] if name not in out)
+
+
+def moved_constants(
+    values: Mapping[str, float], names: Sequence[str], moves: FloatArray
+) -> dict[str, float]:
+    """Return constants with the named ones moved: by factors exp(move), or by sizes."""
+    out = dict(values)
+    for name, move in zip(names, moves, strict=True):
+        spec, old = SPECS[name], out.get(name, 0.0)
+        out[name] = old * float(np.exp(move)) if spec.log else old + spec.size * float(move)
+    return out
+
+
+def slip_of(state: BrushState, quantity: str) -> FloatArray:
+    """Return signed slip as C slip / (mu Fz): from 3 on the whole contact slides."""
+    slip, stiffness = np.tan(state.slip_angle), state.c_py
+    if quantity == "Fx":
+        slip, stiffness = state.slip_ratio, state.c_px
+    out: FloatArray = 2.0 * stiffness * state.a**2 * slip / (state.mu * state.conditions.load)
+    return out
 
 
 def changes_at(effects: Sequence[Effect], strengths: Sequence[FloatArray]) -> Changes:

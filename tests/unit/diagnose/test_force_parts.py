@@ -9,8 +9,9 @@ from tests.unit.force_points import ANGLES, LOADS, MODEL, PRESSURES, VALUES
 from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
 from tirelib.diagnose.forces.diagnose import diagnose_force
 from tirelib.diagnose.forces.fit import Problem, fit_force
-from tirelib.diagnose.forces.held_out import ForceFold, force_folds, pooled
+from tirelib.diagnose.forces.held_out import force_folds
 from tirelib.diagnose.forces.left import left_of
+from tirelib.diagnose.held_out import Fold, pooled
 from tirelib.effects import CATALOGUE, effect
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.force_points import force_points
@@ -66,9 +67,9 @@ def test_cells_are_held_out_where_no_set_point_can_be_spared() -> None:
 def test_the_held_out_error_is_over_the_points_of_the_folds_that_count() -> None:
     few, many = np.arange(10) < 2, np.arange(10) >= 2
     folds = (
-        ForceFold("time", 0.0, few, main=True),
-        ForceFold("time", 1.0, many, main=True),
-        ForceFold("load", 0.0, few, main=False),
+        Fold("time", 0.0, few, main=True),
+        Fold("time", 1.0, many, main=True),
+        Fold("load", 0.0, few, main=False),
     )
     assert pooled((3.0, 1.0, 99.0), folds) == pytest.approx(np.sqrt((2 * 9.0 + 8 * 1.0) / 10.0))
     assert np.isnan(pooled((3.0, float("nan"), 1.0), folds))
@@ -129,9 +130,11 @@ def test_errors_fall_from_step_to_step_to_that_of_the_final_model() -> None:
     assert name == "friction_load"
     assert fit is found.final
     assert fit.error < 0.2 * found.base.error
-    assert found.held_out(fit) < 0.5 * found.held_out(found.base)
+    folds = found.models.folds
+    held, before = (pooled(found.models.held_out(each), folds) for each in (fit, found.base))
+    assert held < 0.5 * before
     first, *others = found.findings
     assert (first.effect.name, first.level) == ("friction_load", "alarm")
     assert found.error_with(first) == fit.error
-    assert np.isnan(found.held_with(others[0]))
+    assert others[0].effect.name not in found.alone
     assert found.error_with(others[0]) <= found.base.error

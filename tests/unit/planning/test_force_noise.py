@@ -35,7 +35,9 @@ def test_set_points_count_as_far_as_the_present_points_show_them() -> None:
     assert exact.share < 0.3
     off = set_points(made.problem, base) @ np.array([1.0, 1.0, 1.0, 0.0])
     signs = np.random.default_rng(4).choice([-1.0, 1.0], off.size)
-    rough = replace(made, problem=made.problem.but(made.problem.measured + signs * off))
+    rough = replace(
+        made, problem=replace(made.problem, measured=made.problem.measured + signs * off)
+    )
     noise, counted = counted_noise(rough, fit_force(rough.problem, VALUES), none)
     assert counted.share > 2.0 * exact.share
     # set points explain it: the noise of a point stays that of repeats

@@ -12,6 +12,7 @@ from tirelib.diagnose.diagnose import FALSE_ALARM, Finding
 from tirelib.diagnose.forces.diagnose import ForceDiagnosis, diagnose_force
 from tirelib.diagnose.forces.fit import ForceFit, Problem
 from tirelib.diagnose.forces.left import ForceLeft, left_of
+from tirelib.diagnose.told import Assessed
 from tirelib.effects import Effect
 from tirelib.errors import CalibrationError
 from tirelib.identify.force_bench import Changes
@@ -164,45 +165,29 @@ def _lack(case: ForceCase) -> float:
     return case.given / float(np.sqrt(np.mean(case.whole.measured**2)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ForceAssessment:
-    """A diagnosis as it is told.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ForceAssessment(Assessed):
+    """A diagnosis of a force as it is told.
 
     Attributes
     ----------
     case : ForceCase
-    diagnosis : ForceDiagnosis
-    verdict : str
-    named : tuple of str
-        Empty without repeats.
-    findings : tuple of Finding
-        At most hints without repeats.
-    floor : float
-        The part of the error with the named effects that noise and what plain tires show explain;
-        NaN without repeats.
     left : ForceLeft
         What no effect explains.
-    messages : tuple of str
     """
 
-    case: ForceCase
     diagnosis: ForceDiagnosis
-    verdict: str
-    named: tuple[str, ...]
-    findings: tuple[Finding, ...]
-    floor: float
+    case: ForceCase
     left: ForceLeft
-    messages: tuple[str, ...]
 
     @property
-    def final(self) -> ForceFit:
-        """The brush with the named effects."""
-        return self.diagnosis.final if self.named else self.diagnosis.base
+    def factor(self) -> float:
+        """By which an rms in SI becomes an error as it is told."""
+        return self.case.factor
 
-    @property
-    def sets(self) -> tuple[tuple[str, ...], ...]:
-        """Smallest members of the confidence set, best first; empty where nothing is named."""
-        return self.diagnosis.verdict.sets if self.named else ()
+    def error_with(self, finding: Finding) -> float:
+        """Return the error with one effect alone, to first order unless it is named."""
+        return self.factor * self.diagnosis.error_with(finding)
 
     @property
     def before(self) -> float:
@@ -267,14 +252,16 @@ def assess_forces(
         messages += _in_order(case, [f.effect for f in findings if f.effect.name in named])
     final = found.final if named else found.base
     return ForceAssessment(
-        case,
-        found,
-        verdict,
-        named,
-        findings,
-        case.told(found.models.floor(final), final),
-        left_of(case.problem, final),
-        tuple(messages),
+        diagnosis=found,
+        verdict=verdict,
+        named=named,
+        findings=findings,
+        floor=case.told(found.models.floor(final), final),
+        folds=found.models.folds,
+        singles=found.alone,
+        messages=tuple(messages),
+        case=case,
+        left=left_of(case.problem, final),
     )
 
 

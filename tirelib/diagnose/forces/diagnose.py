@@ -8,8 +8,8 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.diagnose import FALSE_ALARM, Finding, findings_of
 from tirelib.diagnose.forces.fit import ForceFit, Problem
-from tirelib.diagnose.forces.held_out import pooled
 from tirelib.diagnose.forces.models import ForceModels, plain_tires
+from tirelib.diagnose.held_out import pooled
 from tirelib.effects import Effect
 from tirelib.infer.forces import ForceProblem
 from tirelib.infer.select import Verdict, select
@@ -57,10 +57,6 @@ class ForceDiagnosis:
         """Effects that the points cannot show, with the reason."""
         return self.models.given.dead
 
-    def held_out(self, fit: ForceFit) -> float:
-        """Return a model's error on held-out points, SI."""
-        return pooled(self.models.held_out(fit), self.models.folds)
-
     @property
     def exceeds(self) -> bool:
         """Whether more is left than plain tires leave."""
@@ -71,11 +67,6 @@ class ForceDiagnosis:
         if finding.effect.name in self.alone:
             return self.alone[finding.effect.name].error
         return self.base.error * float(np.sqrt(max(1.0 - finding.share, 0.0)))
-
-    def held_with(self, finding: Finding) -> float:
-        """Return the held-out error with one effect alone, SI; NaN unless it is named."""
-        fit = self.alone.get(finding.effect.name)
-        return float("nan") if fit is None else self.held_out(fit)
 
 
 @one_thread()

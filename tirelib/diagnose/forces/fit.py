@@ -1,7 +1,7 @@
 """The brush with some effects fitted to one force: parameters and strengths together."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -11,7 +11,7 @@ from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, TirelibError
 from tirelib.identify.brush_law import SPECS
 from tirelib.identify.force_bench import Changes, ForceBench
-from tirelib.infer.forces import COORDINATES, LOAD_RATIO, OF_CONTACT, WIDTH, changes_at
+from tirelib.infer.forces import WIDTH, changes_at, fitted_constants, moved_constants
 
 BEYOND = 0.5
 """Share of its range by which a strength may leave it in a fit."""
@@ -66,10 +66,6 @@ class Problem:
             self.block[chosen],
         )
 
-    def but(self, measured: FloatArray) -> "Problem":
-        """Return the problem with another measurement."""
-        return replace(self, measured=measured)
-
     def predict(self, values: Mapping[str, float], changes: Changes) -> FloatArray:
         """Return the force at the points."""
         found: FloatArray = getattr(self.bench.forces(values, changes), self.quantity)
@@ -78,13 +74,7 @@ class Problem:
     @property
     def names(self) -> tuple[str, ...]:
         """Parameters that are fitted."""
-        load = self.bench.conditions.load
-        out: tuple[str, ...] = ()
-        if self.bench.half is not None:
-            out = OF_CONTACT
-        elif load.max() < LOAD_RATIO * load.min():
-            out = ("load_power",)
-        return tuple(name for name in COORDINATES[self.quantity] if name not in out)
+        return fitted_constants(self.bench, self.quantity)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,16 +126,6 @@ class ForceFit:
         return float(abs(unit) * np.sqrt(self.covariance[at, at]))
 
 
-def moved(values: Mapping[str, float], names: Sequence[str], z: FloatArray) -> dict[str, float]:
-    """Return values with the named ones moved by z: by factors exp(z), or by z sizes."""
-    out = dict(values)
-    for name, step in zip(names, z, strict=True):
-        spec = SPECS[name]
-        old = out.get(name, 0.0)
-        out[name] = old * float(np.exp(step)) if spec.log else old + spec.size * float(step)
-    return out
-
-
 def fit_force(
     problem: Problem,
     values: Mapping[str, float],
@@ -182,7 +162,7 @@ def fit_force(
         return tuple(np.split(flat, cuts)) if chosen else ()
 
     def predicted(z: FloatArray) -> FloatArray:
-        at = moved(values, names, z[: len(names)])
+        at = moved_constants(values, names, z[: len(names)])
         return problem.predict(at, changes_at(chosen, split(z)))
 
     def residual(z: FloatArray) -> FloatArray:
@@ -216,14 +196,14 @@ def fit_force(
             f"brush with {', '.join(e.name for e in chosen) or 'no effect'}: the fit does not "
             f"settle in {MOST} steps; the model does not fit these data: look at them with "
             "`tirelib compare`",
-            moved(values, names, found.x[: len(names)]),
+            moved_constants(values, names, found.x[: len(names)]),
             float(found.optimality),
         )
     z = np.asarray(found.x, dtype=np.float64)
     here, rows = predicted(z), slopes(z)
     rest = problem.measured - here
     return ForceFit(
-        moved(values, names, z[: len(names)]),
+        moved_constants(values, names, z[: len(names)]),
         chosen,
         split(z),
         here,
@@ -268,7 +248,7 @@ def slopes_at(problem: Problem, model: ForceFit) -> FloatArray:
     for k in range(len(model.names) + len(scale)):
         step = np.zeros(len(model.names) + len(scale))
         step[k] = STEP
-        values = moved(model.values, model.names, step[: len(model.names)])
+        values = moved_constants(model.values, model.names, step[: len(model.names)])
         flat = np.concatenate([*model.strengths, []]) + step[len(model.names) :] * scale
         cuts = np.cumsum([effect.components for effect in model.effects])[:-1]
         strengths = np.split(flat, cuts) if model.effects else []

@@ -7,7 +7,7 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.diagnose.forces.fit import ForceFit, Problem
-from tirelib.infer.forces import varies
+from tirelib.infer.forces import slip_of, varies
 from tirelib.model.brush import BrushConditions
 
 FLAT = 0.2
@@ -52,7 +52,8 @@ class ForceLeft:
 def left_of(problem: Problem, model: ForceFit) -> ForceLeft:
     """Return what a fitted model leaves of the force that it was fitted to."""
     residual = model.predicted - problem.measured
-    x = np.abs(_slip(problem, model))
+    # without the effects
+    x = np.abs(slip_of(problem.bench.state(model.values), problem.quantity))
     squares = residual**2
     total = max(float(squares.sum()), 1e-30)
     shares = {
@@ -75,16 +76,6 @@ def left_of(problem: Problem, model: ForceFit) -> ForceLeft:
     )
 
 
-def _slip(problem: Problem, model: ForceFit) -> FloatArray:
-    """Return signed slip as C slip / (mu Fz), without the effects."""
-    state = problem.bench.state(model.values)
-    slip, stiffness = np.tan(state.slip_angle), state.c_py
-    if problem.quantity == "Fx":
-        slip, stiffness = state.slip_ratio, state.c_px
-    out: FloatArray = 2.0 * stiffness * state.a**2 * slip / (state.mu * state.conditions.load)
-    return out
-
-
 def _powers(at: BrushConditions, size: FloatArray) -> dict[str, tuple[float, float]]:
     names = [name for name in _POWERS if varies(at, name) and (getattr(at, name) > 0.0).all()]
     columns = [np.log(getattr(at, name)) for name in names]
@@ -104,7 +95,7 @@ def _guess(problem: Problem, model: ForceFit, residual: FloatArray) -> str | Non
     """Return the product of a slip term and a condition that explains most on other points."""
     if len(problem) < 40:
         return None
-    at, x = problem.bench.conditions, _slip(problem, model)
+    at, x = problem.bench.conditions, slip_of(problem.bench.state(model.values), problem.quantity)
     soft = x / (1.0 + np.abs(x))
     slips = {
         "slip / (1 + |slip|)": soft,
