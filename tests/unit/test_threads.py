@@ -19,8 +19,8 @@ from tirelib.diagnose.diagnose import diagnose
 from tirelib.diagnose.forces.diagnose import diagnose_force
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.train import train
-from tirelib.extend.extension import add_effect
-from tirelib.extend.force_extension import add_brush_effect
+from tirelib.extend.extension import extended
+from tirelib.extend.force_extension import extended_brush
 from tirelib.identify.forces import identify_forces
 from tirelib.identify.identify import identify
 from tirelib.identify.whole import identify_whole
@@ -91,8 +91,8 @@ class Asked:
         (compare, 2, ()),
         (diagnose, 3, ()),
         (diagnose_force, 3, ("noise",)),
-        (add_effect, 3, ()),
-        (add_brush_effect, 2, ()),
+        (extended, 3, ()),
+        (extended_brush, 3, ()),
         (next_test, 3, ()),
         (selftest, 3, ()),
         (train, 1, ()),

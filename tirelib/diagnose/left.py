@@ -15,6 +15,8 @@ from tirelib.waveforms import GRID
 
 FLAT = 0.2
 """Power of a condition below which the residual is said not to change with it."""
+LEAST, TINY = 1e-3, 1e-12
+"""Size below which a misfit counts as this large: over the largest, and at all."""
 MOST = 0.7
 """Share of the squares that the told range of angles holds."""
 CONDITIONS = ("load", "pressure", "speed", "slip_angle", "camber", "slip_ratio")
@@ -35,6 +37,11 @@ class Power:
     value: float
     low: float
     high: float
+
+    @property
+    def half(self) -> float:
+        """Half the width of the interval."""
+        return 0.5 * (self.high - self.low)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,22 +129,35 @@ def _span(squares: FloatArray) -> tuple[float, float]:
 
 def _powers(points: Operating, rms: FloatArray) -> dict[str, Power | None]:
     """Return the powers of the conditions that tell the runs' rms, with intervals."""
-    names = [name for name in CONDITIONS if _varies(np.asarray(getattr(points, name)))]
-    out: dict[str, Power | None] = dict.fromkeys(CONDITIONS)
-    free = len(rms) - len(names) - 1
-    if free < 1 or not names:
-        return out
-    columns = [np.log(np.abs(getattr(points, name))) for name in names]
-    matrix = np.stack([np.ones(len(rms)), *columns], axis=1)
-    response = np.log(np.maximum(rms, 1e-12))
+    values = {name: np.asarray(getattr(points, name)) for name in CONDITIONS}
+    varied = {name: np.abs(each) for name, each in values.items() if _varies(each)}
+    return dict.fromkeys(CONDITIONS) | powers_of(varied, rms)
+
+
+def powers_of(conditions: Mapping[str, FloatArray], size: FloatArray) -> dict[str, Power]:
+    """Return the powers with which a misfit's size goes; none without enough numbers.
+
+    Parameters
+    ----------
+    conditions : mapping of name to shape (n,)
+        Positive.
+    size : shape (n,)
+        Not negative.
+    """
+    free = size.size - len(conditions) - 1
+    if free < 1 or not conditions:
+        return {}
+    columns = [np.log(each) for each in conditions.values()]
+    matrix = np.stack([np.ones(size.size), *columns], axis=1)
+    response = np.log(np.maximum(size, max(LEAST * float(size.max()), TINY)))
     found = np.linalg.lstsq(matrix, response, rcond=None)[0]
     left = response - matrix @ found
     spread = np.linalg.pinv(matrix.T @ matrix) * float(left @ left) / free
-    reach = float(stats.t.ppf(0.975, free))
-    for k, name in enumerate(names, start=1):
-        half = reach * float(np.sqrt(max(spread[k, k], 0.0)))
-        out[name] = Power(float(found[k]), float(found[k]) - half, float(found[k]) + half)
-    return out
+    half = stats.t.ppf(0.975, free) * np.sqrt(np.maximum(np.diag(spread), 0.0))
+    return {
+        name: Power(float(p), float(p - h), float(p + h))
+        for name, p, h in zip(conditions, found[1:], half[1:], strict=True)
+    }
 
 
 def _varies(values: FloatArray) -> bool:

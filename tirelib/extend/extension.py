@@ -41,49 +41,27 @@ class Extension(Step[Fitted]):
 
 
 @one_thread()
-def add_effect(
-    runs: StraightRuns,
-    model: Model,
-    effect: Effect,
-    *,
-    progress: Callable[[str], None] | None = None,
+def extended(
+    models: StrainModels, given: Model, effect: Effect, before: Fitted | None = None
 ) -> Extension:
     """Return a model with one effect more; values and all strengths are fitted anew.
 
     Parameters
     ----------
-    runs : StraightRuns
-    model : Model
-    effect : Effect
-    progress : callable, optional
-
-    Raises
-    ------
-    ParameterError
-        If the model has the effect already, or strain cannot have it.
-    CalibrationError
-        If the campaign cannot show it.
-    ConvergenceError
-        If a fit does not settle.
-    """
-    refuse(model, effect)
-    return extended(strain_models(runs, model, [effect], progress), model, effect)
-
-
-@one_thread()
-def extended(
-    models: StrainModels, given: Model, effect: Effect, before: Fitted | None = None
-) -> Extension:
-    """Return a model with one effect more, from models about it; errors as of `add_effect`.
-
-    Parameters
-    ----------
     models : StrainModels
+        About the model (`strain_models`).
     given : Model
         As its file has it.
     effect : Effect
     before : Fitted, optional
         One of the models, with effects that were added before.
+
+    Raises
+    ------
+    CalibrationError
+        If the campaign cannot show it.
+    ConvergenceError
+        If a fit does not settle.
     """
     step = added(models, effect, before)
     return _extension(step, models, models, given if before is None else None)
@@ -99,7 +77,12 @@ def remove_effect(
 ) -> Extension:
     """Return a model without one of its effects; the rest is fitted anew.
 
-    Parameters and errors as for `add_effect`.
+    Raises
+    ------
+    ParameterError
+        If the model does not have the effect.
+    ConvergenceError
+        If a fit does not settle.
     """
     places = kept(model.name, model.of_strain[0], effect, "strain")
     models = strain_models(runs, model, [effect], progress)

@@ -33,47 +33,26 @@ class ForceExtension(Step[ForceFit]):
 
 
 @one_thread()
-def add_brush_effect(
-    case: ForceCase,
-    effect: Effect,
-    *,
-    progress: Callable[[str], None] | None = None,
+def extended_brush(
+    models: ForceModels, case: ForceCase, effect: Effect, before: ForceFit | None = None
 ) -> ForceExtension:
     """Return a brush with one effect more; parameters and all strengths are fitted anew.
 
     Parameters
     ----------
-    case : ForceCase
-    effect : Effect
-        Of stage brush.
-    progress : callable, optional
-
-    Raises
-    ------
-    ParameterError
-        If the model has the effect already, or it does not act on the brush.
-    CalibrationError
-        If the campaign cannot show it.
-    ConvergenceError
-        If a fit does not settle.
-    """
-    refuse_brush(case, effect)
-    return extended_brush(force_models(case, [effect], progress), case, effect)
-
-
-@one_thread()
-def extended_brush(
-    models: ForceModels, case: ForceCase, effect: Effect, before: ForceFit | None = None
-) -> ForceExtension:
-    """Return a brush with one effect more, from models about it; errors as of `add_brush_effect`.
-
-    Parameters
-    ----------
     models : ForceModels
+        About the brush of the case (`force_models`).
     case : ForceCase
     effect : Effect
     before : ForceFit, optional
         One of the models, with effects that were added before.
+
+    Raises
+    ------
+    CalibrationError
+        If the campaign cannot show it.
+    ConvergenceError
+        If a fit does not settle.
     """
     given = case.given if before is None else case.error(before)
     return ForceExtension(**vars(added(models, effect, before)), case=case, given=given)
@@ -86,10 +65,7 @@ def remove_brush_effect(
     *,
     progress: Callable[[str], None] | None = None,
 ) -> ForceExtension:
-    """Return a brush without one of its effects; the rest is fitted anew.
-
-    Parameters and errors as for `add_brush_effect`.
-    """
+    """Return a brush without one of its effects; errors as of `remove_effect`."""
     places = kept(case.model.name, case.effects, effect, "the brush")
     models = force_models(case, [effect], progress)
     before = models.at()

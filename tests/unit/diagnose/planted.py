@@ -6,10 +6,10 @@ import numpy as np
 
 from tests.synthetic import LATERAL
 from tests.unit.identify.model_waves import TIRE, made_waves
-from tirelib.compare.model import model_of
-from tirelib.effects import CATALOGUE
+from tirelib.compare.model import Model, model_of
+from tirelib.effects import CATALOGUE, Effect
 from tirelib.effects.effect import Strength
-from tirelib.extend.extension import Extension, add_effect
+from tirelib.extend.extension import Extension, extended, refuse, strain_models
 from tirelib.extend.model_file import extended_file
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.model.base import operating_points, values_of
@@ -59,6 +59,12 @@ def model_file(*effects: tuple[str, float]) -> TireFile:
     )
     listed = [{"effect": name, "strength": x, "unit": CATALOGUE[name].unit} for name, x in effects]
     return TireFile("made", numbers, {"effects": listed, "history": []})
+
+
+def add_effect(measured: StraightRuns, model: Model, effect: Effect) -> Extension:
+    """Return a model with one effect more, fitted to runs."""
+    refuse(model, effect)
+    return extended(strain_models(measured, model, [effect]), model, effect)
 
 
 @cache

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.unit.diagnose.planted import EFFECT, STRENGTH, added, model_file, runs
+from tests.unit.diagnose.planted import EFFECT, STRENGTH, add_effect, added, model_file, runs
 from tirelib.compare.error import error_of
 from tirelib.compare.model import model_of
 from tirelib.effects import CATALOGUE
 from tirelib.errors import CalibrationError, FormatError, ParameterError
 from tirelib.extend.document import extension_document
-from tirelib.extend.extension import add_effect, known_effect, remove_effect
+from tirelib.extend.extension import known_effect, remove_effect
 from tirelib.extend.model_file import extended_file, undone_file
 from tirelib.parameters import read_tire, write_tire
 

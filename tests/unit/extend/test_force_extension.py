@@ -8,13 +8,15 @@ import pytest
 
 from tests.unit.force_campaigns import brush_file, steady_runs, write_forces
 from tirelib.diagnose.forces.assess import ForceCase, force_case, force_cases
-from tirelib.effects import CATALOGUE
+from tirelib.effects import CATALOGUE, Effect
 from tirelib.errors import FormatError, ParameterError
 from tirelib.extend.force_document import force_extended_file, force_extension_document
 from tirelib.extend.force_extension import (
     ForceExtension,
-    add_brush_effect,
     case_for,
+    extended_brush,
+    force_models,
+    refuse_brush,
     remove_brush_effect,
 )
 from tirelib.extend.model_file import undone_file
@@ -35,6 +37,11 @@ def case(tmp_path_factory: pytest.TempPathFactory, model: TireFile) -> ForceCase
     folder = tmp_path_factory.mktemp("extend")
     campaign = write_forces(folder / "steady", steady_runs(slope=SLOPE), "steady")
     return force_case(campaign, model, CATALOGUE, "Fy")
+
+
+def add_brush_effect(case: ForceCase, effect: Effect) -> ForceExtension:
+    refuse_brush(case, effect)
+    return extended_brush(force_models(case, [effect]), case, effect)
 
 
 @pytest.fixture(scope="module")

@@ -47,7 +47,9 @@ def _unexplained(told: ForceAssessment) -> dict[str, Any]:
         "scaling": left.scaling if beyond else None,
         "guess": left.guess if beyond else None,
         "bands": dict(left.bands),
-        "powers": {name: {"power": p, "half_width": h} for name, (p, h) in left.powers.items()},
+        "powers": {
+            name: {"power": p.value, "half_width": p.half} for name, p in left.powers.items()
+        },
     }
 
 

@@ -7,11 +7,10 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.diagnose.forces.fit import ForceFit, Problem
+from tirelib.diagnose.left import FLAT, Power, powers_of
 from tirelib.infer.forces import slip_of, varies
 from tirelib.model.brush import BrushConditions
 
-FLAT = 0.2
-"""Power of a condition below which the residual is said not to change with it."""
 BANDS = (
     (0.0, 1.0, "where most of the contact sticks"),
     (1.0, 3.0, "where sticking gives way"),
@@ -35,7 +34,7 @@ class ForceLeft:
         In words.
     bands : mapping of band to float
         Share of the squares.
-    powers : mapping of condition to (power, half-width of its 95 % interval)
+    powers : mapping of condition to Power
         With which the residual's size goes.
     guess : str or None
         A law that would take a part of it away, found by regression.
@@ -45,7 +44,7 @@ class ForceLeft:
     where: str
     scaling: str
     bands: Mapping[str, float]
-    powers: Mapping[str, tuple[float, float]]
+    powers: Mapping[str, Power]
     guess: str | None
 
 
@@ -62,9 +61,10 @@ def left_of(problem: Problem, model: ForceFit) -> ForceLeft:
     first = max(shares, key=lambda name: shares[name])
     powers = _powers(problem.bench.conditions, np.abs(residual))
     moves = [
-        f"{'grows' if power > 0 else 'falls'} with {name} (power {power:+.1f} ± {half:.1f})"
-        for name, (power, half) in powers.items()
-        if abs(power) >= max(FLAT, half)
+        f"{'grows' if power.value > 0 else 'falls'} with {name} "
+        f"(power {power.value:+.1f} ± {power.half:.1f})"
+        for name, power in powers.items()
+        if abs(power.value) >= max(FLAT, power.half)
     ]
     return ForceLeft(
         residual,
@@ -76,19 +76,9 @@ def left_of(problem: Problem, model: ForceFit) -> ForceLeft:
     )
 
 
-def _powers(at: BrushConditions, size: FloatArray) -> dict[str, tuple[float, float]]:
+def _powers(at: BrushConditions, size: FloatArray) -> dict[str, Power]:
     names = [name for name in _POWERS if varies(at, name) and (getattr(at, name) > 0.0).all()]
-    columns = [np.log(getattr(at, name)) for name in names]
-    n = size.size
-    if not columns or n <= len(columns) + 2:
-        return {}
-    matrix = np.stack([np.ones(n), *columns], axis=1)
-    target = np.log(np.maximum(size, 1e-3 * max(float(size.max()), 1e-12)))
-    found, _, _, _ = np.linalg.lstsq(matrix, target, rcond=None)
-    rest = target - matrix @ found
-    spread = np.linalg.pinv(matrix.T @ matrix) * float(rest @ rest) / (n - len(found))
-    half = 1.96 * np.sqrt(np.diag(spread))
-    return {name: (float(found[k + 1]), float(half[k + 1])) for k, name in enumerate(names)}
+    return powers_of({name: getattr(at, name) for name in names}, size)
 
 
 def _guess(problem: Problem, model: ForceFit, residual: FloatArray) -> str | None:
