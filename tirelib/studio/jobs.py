@@ -24,7 +24,7 @@ MOST_ERRORS = 400
 """Points of the error's fall that a job keeps."""
 RUNNER = (sys.executable, "-m", "tirelib.studio.runner")
 """Command of the process that waits for a job."""
-_ERROR = re.compile(r"\berror (\d+(?:\.\d+)?(?:e[+-]?\d+)?)")
+_ERROR = re.compile(r"\b(error|cost) (\d+(?:\.\d+)?(?:e[+-]?\d+)?)")
 
 
 @dataclass(slots=True)
@@ -68,13 +68,17 @@ class Job:
 
 @dataclass(slots=True)
 class Progress:
-    """How far a running job is: what it does, steps so far and in all, label, errors seen."""
+    """How far a running job is: what it does, steps so far and in all, label, errors seen.
+
+    The errors are those that the labels name last: an ``error``, or the ``cost`` of a fit.
+    """
 
     what: str = ""
     done: int = 0
     total: int | None = None
     label: str = ""
     errors: list[float] = field(default_factory=list)
+    measure: str = ""
     rest: bytes = b""
     at: int = 0
 
@@ -98,7 +102,8 @@ class Progress:
         except (ValueError, TypeError, KeyError):
             return False
         if found := _ERROR.search(self.label):
-            self.errors = [*self.errors[-MOST_ERRORS:], float(found[1])]
+            before = self.errors[-MOST_ERRORS:] if found[1] == self.measure else []
+            self.measure, self.errors = found[1], [*before, float(found[2])]
         return True
 
 

@@ -117,6 +117,7 @@ def progress(desk: Desk) -> list[dict[str, Any]]:
             "total": p.total,
             "label": p.label,
             "errors": p.errors,
+            "measure": p.measure,
         }
         for job in desk.jobs.all.values()
         if job.state == "running" and (p := desk.jobs.progress.get(job.number)) is not None

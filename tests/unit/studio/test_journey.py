@@ -1,11 +1,12 @@
 """The journey over the server: what follows what, cancel, history, and what a restart keeps."""
 
+import json
 import os
 from pathlib import Path
 
 from tests.unit.studio.conftest import RUNNER, Served, until
 from tirelib.studio.desk import Desk
-from tirelib.studio.jobs import Jobs
+from tirelib.studio.jobs import Jobs, Progress
 from tirelib.studio.session import Session
 
 
@@ -120,6 +121,21 @@ def test_what_nobody_has_asked_for_goes_on_after_a_restart(tmp_path: Path) -> No
         ("compare", "interrupted"),
         ("compare", "waiting"),
     ]
+
+
+def test_the_fall_of_a_fit_is_read_from_its_steps(tmp_path: Path) -> None:
+    labels = ["error 3.5", "run 7", "error 2", "fit of the base, cost 45123", "the base, cost 1e3"]
+    lines = [
+        json.dumps({"progress": "fitting", "done": k, "total": None, "label": label})
+        for k, label in enumerate(labels)
+    ]
+    said, progress = tmp_path / "stderr.txt", Progress()
+    said.write_text("\n".join(lines[:3]) + "\n")
+    assert progress.read(said)
+    assert (progress.measure, progress.errors) == ("error", [3.5, 2.0])
+    said.write_text("\n".join(lines) + "\n")
+    assert progress.read(said)
+    assert (progress.measure, progress.errors) == ("cost", [45123.0, 1000.0])
 
 
 def test_a_job_ends_when_its_server_is_gone(tmp_path: Path) -> None:

@@ -10,6 +10,9 @@ const FLAGS = {
   heldout_worse: "On a part of the runs that was held out the error rose: there the effect may stand for another one.",
 };
 
+// What falls while a fit runs, as its steps tell it.
+const MEASURES = { error: { title: "weighted residual of the fits, step by step: of all runs, then with parts held out", unit: "weighted residual [1]" }, cost: { title: "cost of the fit, step by step: the squares of what is left, weighted by noise and scatter", unit: "cost [1]" } };
+
 // Why there is no verdict of the model yet, or none at all.
 function noVerdict(c) {
   const broken = failedOf("compare") || failedOf("diagnose");
@@ -40,7 +43,7 @@ export class Add {
     const job = this.fitting().find((one) => one.state === "running"), at = job && progressOf(job.job);
     if (!at || !this.text) return;
     this.text.textContent = at.label ? `${at.label} (step ${at.done})` : "begins";
-    if (at.errors.length > 1) this.plot.show({ title: "weighted residual of the fits, step by step: of all runs, then with parts held out", unit: "weighted residual [1]", x: { title: "step", values: at.errors.map((_, i) => i + 1) }, series: [{ name: "error", values: at.errors, color: "model" }] });
+    if (at.errors.length > 1) this.plot.show({ ...MEASURES[at.measure], x: { title: "step", values: at.errors.map((_, i) => i + 1) }, series: [{ name: at.measure, values: at.errors, color: "model" }] });
   }
 
   update() {
