@@ -11,10 +11,10 @@ typedef struct {
 
 static const char FORMAT[16] = "tire-state/3";
 
-/* Hash of bytes, so that damage is seen (FNV-1a, G. Fowler, L. C. Noll, K.-P. Vo, 1991). */
-static uint64_t hash(const unsigned char *bytes, size_t n) {
+uint64_t state_hash(const void *bytes, size_t n) { /* G. Fowler, L. C. Noll, K.-P. Vo, 1991 */
+    const unsigned char *at = bytes;
     uint64_t h = 14695981039346656037u;
-    for (size_t i = 0; i < n; i++) h = (h ^ bytes[i]) * 1099511628211u;
+    for (size_t i = 0; i < n; i++) h = (h ^ at[i]) * 1099511628211u;
     return h;
 }
 
@@ -43,8 +43,8 @@ static Head head_of(const Wheel *w) {
     h.rows = c->ring.total - h.first;
     h.live = sizeof w->live;
     h.cutter = sizeof *c;
-    h.calibration = (int64_t)hash((const unsigned char *)w->calibration->lateral,
-                                  sizeof w->calibration->lateral);
+    h.calibration =
+        (int64_t)state_hash(w->calibration->lateral, sizeof w->calibration->lateral);
     return h;
 }
 
@@ -96,7 +96,7 @@ void state_save(const Wheel *w, unsigned char *bytes) {
         put(&at, &c->waiting[(c->next + i) % c->places], sizeof(Contact));
     for (int64_t i = 0; i < h.rows; i++)
         put(&at, ring_row(&c->ring, h.first + i), (size_t)c->ring.width * sizeof(double));
-    uint64_t sum = hash(bytes, (size_t)(at - bytes));
+    uint64_t sum = state_hash(bytes, (size_t)(at - bytes));
     put(&at, &sum, sizeof sum);
 }
 
@@ -114,7 +114,7 @@ int state_restore(Wheel *w, const unsigned char *bytes, size_t n) {
                 h.queued <= c->places;
     if (!alike || n != size_of(&h, c->ring.width)) return 0;
     memcpy(&sum, bytes + n - sizeof sum, sizeof sum);
-    if (sum != hash(bytes, n - sizeof sum)) return 0;
+    if (sum != state_hash(bytes, n - sizeof sum)) return 0;
     get(&w->live, &at, sizeof w->live);
     get(c, &at, sizeof *c);
     keep_places(c, &kept);

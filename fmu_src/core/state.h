@@ -5,6 +5,9 @@
 
 #include "wheel.h"
 
+/* Hash of bytes, so that damage is seen (FNV-1a). */
+uint64_t state_hash(const void *bytes, size_t n);
+
 /* How many bytes the state has now. */
 size_t state_size(const Wheel *wheel);
 

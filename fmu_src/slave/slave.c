@@ -216,17 +216,24 @@ static void exchange(Slave *s, unsigned char *bytes, int *running, int back) {
     }
 }
 
+/* What stands at the end of a state of n bytes: it tells damage, and states of other FMUs. */
+static uint64_t seal(const Slave *s, const unsigned char *bytes, size_t n) {
+    return state_hash(bytes, n) ^ state_hash(s->own.guid, strlen(s->own.guid));
+}
+
 SlaveState *slave_save(Slave *s) {
     int running = s->running;
     size_t n = own_size(s) + (running ? s->model->state_size(s) : 0);
-    SlaveState *kept = malloc(sizeof *kept + n);
+    SlaveState *kept = malloc(sizeof *kept + n + sizeof(uint64_t));
     if (!kept) {
         slave_failed(s, "MemoryError: %lu bytes", (unsigned long)n);
         return NULL;
     }
-    kept->n = n;
+    kept->n = n + sizeof(uint64_t);
     exchange(s, kept->bytes, &running, 0);
     if (running) s->model->save(s, kept->bytes + own_size(s));
+    uint64_t sealed = seal(s, kept->bytes, n);
+    memcpy(kept->bytes + n, &sealed, sizeof sealed);
     return kept;
 }
 
@@ -234,8 +241,12 @@ static const char NO_STATE[] =
     "FormatError: the bytes are not a saved state of this FMU; save the state again";
 
 int slave_restore(Slave *s, const SlaveState *kept) {
+    uint64_t sealed;
     int running = 0;
-    if (kept->n < own_size(s)) return slave_failed(s, NO_STATE);
+    if (kept->n < own_size(s) + sizeof sealed) return slave_failed(s, NO_STATE);
+    size_t n = kept->n - sizeof sealed;
+    memcpy(&sealed, kept->bytes + n, sizeof sealed);
+    if (sealed != seal(s, kept->bytes, n)) return slave_failed(s, NO_STATE);
     exchange(s, (unsigned char *)kept->bytes, &running, 1);
     for (int i = 0; i < PARAMETERS; i++) s->text[i][TEXT - 1] = 0;
     s->rolling[sizeof s->rolling - 1] = s->status[LINE - 1] = s->cause[LINE - 1] = 0;
@@ -247,7 +258,7 @@ int slave_restore(Slave *s, const SlaveState *kept) {
     int phase = s->phase;
     s->phase = INSTANTIATED;
     if (!s->model->start(s)) return FAILED;
-    if (!s->model->restore(s, kept->bytes + own_size(s), kept->n - own_size(s)))
+    if (!s->model->restore(s, kept->bytes + own_size(s), n - own_size(s)))
         return slave_failed(s, NO_STATE);
     s->running = 1;
     s->phase = phase == TERMINATED ? TERMINATED : STEPPING;

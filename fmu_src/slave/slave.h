@@ -69,7 +69,7 @@ struct Slave {
     unsigned times[CAUSES], causes;
 };
 
-/* A state: variables and parameters, then the wheel's. */
+/* A state: variables and parameters, then the wheel's, then a hash of them and of the FMU's GUID. */
 typedef struct {
     size_t n;
     unsigned char bytes[];
@@ -115,7 +115,8 @@ int slave_turn(const Slave *s);
 const char *slave_text(const Slave *s, unsigned reference);
 int slave_set_text(Slave *s, unsigned reference, const char *text);
 
-/* Take a state, NULL if there is no memory; and take it up again, which returns a status. */
+/* Take a state, NULL if there is no memory; and take it up again, which returns a status: one that
+ * is damaged, or of another FMU, changes nothing. */
 SlaveState *slave_save(Slave *s);
 int slave_restore(Slave *s, const SlaveState *state);
 

@@ -166,15 +166,43 @@ def test_states_go_back_and_forth_and_instances_do_not_meet(folder: Path) -> Non
         for number, frame in enumerate(frames()[at : at + 40], start=at):
             late.step(*frame)
             assert repr(late.show()) == shown[number]
-    damaged = bytearray(states[50])
-    damaged[-100] ^= 1
-    with pytest.raises(FMICallException):
-        late.slave.setFMUState(late.slave.deSerializeFMUstate(bytes(damaged)))
-    assert "not a saved state of this FMU" in late.said[-1]
     host.slave.reset()
     host.start()
     host.step(*frames()[0])
     assert repr(host.show()) == shown[0]
+
+
+def test_what_is_no_state_of_this_fmu_is_refused_and_changes_nothing(
+    folder: Path, tmp_path: Path
+) -> None:
+    host, calm = Host(folder).start(), Host(folder).start()
+    for number, frame in enumerate(frames()):
+        host.step(*frame)
+        calm.step(*frame)
+        if number == 50:
+            state = host.slave.serializeFMUstate(host.slave.getFMUstate())
+    other = build_fmu(
+        live.calibration_file(), tmp_path / "o.fmu", samples_per_step=SAMPLES, sample_rate=8e3
+    )
+    with zipfile.ZipFile(other) as archive:
+        archive.extractall(tmp_path / "o")
+    strange = Host(tmp_path / "o").start(sample_rate=live.RATE)
+    strange.step(*frames()[0])
+    wrong = [b"", state[:1000], state[:-1], state + b"\0", bytes(len(state))]
+    wrong.append(strange.slave.serializeFMUstate(strange.slave.getFMUstate()))
+    for at in (0, 4000, 30000, len(state) // 2, len(state) - 100, len(state) - 1):
+        damaged = bytearray(state)
+        damaged[at] ^= 1
+        wrong.append(bytes(damaged))
+    for bytes_ in wrong:
+        with pytest.raises(FMICallException):
+            host.slave.setFMUState(host.slave.deSerializeFMUstate(bytes_))
+        assert "not a saved state of this FMU" in host.said[-1]
+        assert repr(host.show()) == repr(calm.show())
+    for frame in frames()[:30]:
+        host.step(*frame)
+        calm.step(*frame)
+        assert repr(host.show()) == repr(calm.show())
 
 
 REFUSED = {
