@@ -16,6 +16,9 @@ const select = (options, value, label, change = () => {}) => { const made = h("s
 const amount = (text) => (String(text).trim() ? Number(String(text).trim().replace(",", ".")) : NaN);
 const part = (title, key, ...content) => h("section", {}, h("h3", {}, title, " ", h("code", { class: "quiet" }, key)), ...content);
 
+// A message of the import without the paths of the session, which the page does not show.
+const plain = (message, map) => message.replaceAll(map, "this form").replaceAll(/\S*\/(files\/\d+|jobs\/\d+\/out)\//g, "");
+
 // Wait for what the server finds out about the files: columns and a draft of the map, or why not.
 function found(files) {
   dialog("Import", h("p", { role: "status" }, "The columns of the files are being read."));
@@ -131,7 +134,7 @@ export async function importForm(files, read = {}, before = new Map()) {
     const stop = listen((what) => {
       if (what !== "state") return;
       const job = app.home.jobs.find((one) => one.job === done.job);
-      if (job?.state === "failed") { stop(); said.className = "bad said"; said.textContent = job.message.replaceAll(done.map, "this form"); }
+      if (job?.state === "failed") { stop(); said.className = "bad said"; said.textContent = plain(job.message, done.map); said.scrollIntoView({ block: "nearest" }); }
       if (job?.state === "done") { stop(); document.getElementById("dialog").close(); toast("The campaign was made."); }
     });
   };
@@ -142,7 +145,7 @@ export async function importForm(files, read = {}, before = new Map()) {
     part("Runs", "kind, run_column", h("div", { class: "row" }, h("label", {}, "Kind ", kind), h("label", {}, "A run is ", runColumn))), steady,
     part("Columns", "[channels]", h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["column", "range", "missing", "quantity", "unit", "factor"].map((t, i) => h("th", { class: i === 1 || i === 2 ? "n" : "" }, t)))), h("tbody", {}, rows.map((r) => r.element)))),
       Object.entries(file.left_out || {}).map(([column, why]) => h("p", { class: "small warn" }, `Left out: ${column}: ${why}`))), strain,
-    h("details", { open: Boolean(Object.keys(read).length) || Object.keys(file.left_out || {}).length > 0 }, h("summary", {}, "How the files are read"), (file.notes || []).map((note) => h("p", { class: "small quiet" }, note)), how.element),
+    h("details", { open: Boolean(Object.keys(read).length) || Object.values(file.left_out || {}).some((why) => why.includes("text =")) }, h("summary", {}, "How the files are read"), (file.notes || []).map((note) => h("p", { class: "small quiet" }, note)), how.element),
     said, h("button", { class: "main", type: "button", id: "import", onclick: go }, "Import"), sent);
   restore(before);
   update();

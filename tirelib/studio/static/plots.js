@@ -1,5 +1,6 @@
 // Lines, points and bars with uPlot: one look, units on every axis, data as CSV.
 import { csvButton, fill, h, large, number, tall } from "./dom.js";
+import { niceTicks } from "./maps.js";
 
 export const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const live = new Set();
@@ -81,8 +82,7 @@ export function waterfall(steps, unit) {
   const every = steps.flatMap((step) => [step.error, step.heldout]).filter(Number.isFinite);
   const high = 1.12 * Math.max(...every, 1e-9), up = (value) => height - bottom - ((height - bottom - top) * value) / high;
   const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, class: "waterfall", role: "img", "aria-label": `Error by step: ${steps.map((s) => `${s.name} ${number(s.error)}`).join(", ")} ${unit}` });
-  for (let i = 0; i <= 4; i += 1) {
-    const value = (high * i) / 4.48;
+  for (const value of niceTicks(0, high / 1.12)) {
     svg.append(make("line", { x1: left, x2: width - 8, y1: up(value), y2: up(value), stroke: "var(--grid)" }), make("text", { x: left - 6, y: up(value) + 4, "text-anchor": "end", "font-size": 12, fill: "var(--quiet)" }, number(value, 2)));
   }
   const room = (width - left - 8) / Math.max(steps.length, 2);
