@@ -82,7 +82,7 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
         allowed = {BASE: fit.widths**2, **law_errors(fit, law)}
         found.append(
             max(
-                Null(view, family, family.spread(fit.sizes), allowed).likelihood
+                Null(view, family, family.spread(fit.sizes), allowed, fit.sides).likelihood
                 for family in others
                 for view in views
             )

@@ -96,8 +96,13 @@ def kept_fit(out: Path, file: Path) -> Fit | None:
         kept.parent.mkdir(parents=True, exist_ok=True)
         kept.write_bytes(pickle.dumps(fit_of(file)))
         say(f"{file.parent.name} {file.stem}")
-    fit: Fit | None = pickle.loads(kept.read_bytes())
-    return fit
+    found: Fit | None = pickle.loads(kept.read_bytes())
+    if found is None:
+        return None
+    problem, fit = found
+    beside = tuple(CATALOGUE[name] for name in fit.rows if name in CATALOGUE)
+    strengths = tuple(np.zeros(effect.components) for effect in beside)
+    return problem, replace(fit, point=Point(fit.point.base, beside, strengths))
 
 
 def fit_of(file: Path) -> Fit | None:

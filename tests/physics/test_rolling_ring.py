@@ -35,6 +35,7 @@ BARE: dict[str, Any] = {
     "tension": 0.0,
     "k_u": 4.8e5,
     "k_v": 1.9e5,
+    "softening": 0.0,
     "dashpots": 0.0,
     "k_t": 5.4e7,
     "hardening": 0.0,
@@ -57,6 +58,7 @@ WHOLE = {
     "friction": 0.9,
     "creep": 0.008,
     "hardening": 1.0,
+    "softening": 15.0,
     "dashpots": 0.05,
     "omega": 70.0,
     "crown": 0.5,
@@ -165,6 +167,27 @@ def test_sidewalls_that_pull_leave_the_belt_round_and_keep_their_direction(
     virtual = -pulled[belt.U] * np.sin(turn) + pulled[belt.V] * np.cos(turn)
     moment = virtual * radius - pulled[belt.PSI]
     np.testing.assert_allclose(moment, -pull * radius**2 * np.sin(turn), atol=1e-9)
+
+
+def test_a_sidewall_softens_where_it_is_pressed_and_pushes_with_the_integral_of_its_tangent() -> None:
+    soft, hard = ring(load=4000.0, softening=40.0), ring(load=4000.0)
+    z = np.zeros((6, 1, 5))
+    z[0, 0] = np.linspace(-0.03, 0.0, 5)
+    tangent = belt.stiffness(z, soft)[0, 0] - belt.stiffness(z, hard)[0, 0]
+    expected = hard.radius * hard.k_u * (np.exp(40.0 * z[0, 0]) - 1.0)
+    np.testing.assert_allclose(tangent[0], expected, atol=1e-6)
+    lost = belt.forces(z, soft)[0, 0] - belt.forces(z, hard)[0, 0]
+    fine = np.linspace(-0.03, 0.0, 2001)
+    work = np.trapezoid(np.exp(40.0 * fine) - 1.0, fine)
+    np.testing.assert_allclose(lost[0] - lost[-1], -hard.radius * hard.k_u * work, rtol=1e-6)
+
+
+def test_a_sidewall_that_softens_little_is_one_that_does_not() -> None:
+    one, none = solve(ring(softening=1e-4)), solve(ring())
+    np.testing.assert_allclose(one.deflection, none.deflection, rtol=1e-5)
+    deeper = solve(ring(softening=15.0)).deflection / none.deflection
+    assert (np.diff(deeper) > 0.0).all()
+    assert (deeper > 1.0).all()
 
 
 def test_a_gage_on_a_thick_liner_turns_with_the_belts_line() -> None:

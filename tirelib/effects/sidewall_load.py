@@ -1,11 +1,9 @@
 """Radial sidewall stiffness over deflection."""
 
-import numpy as np
-
 from tirelib.effects.effect import State, effect
 
-REFERENCE = 0.020
-"""Deflection at which the base model's k_u holds, [m]."""
+FALL = 0.020
+"""Displacement by which the tangent stiffness falls to exp(-s), [m]."""
 
 
 @effect(
@@ -15,11 +13,14 @@ REFERENCE = 0.020
     low=0.0,
     high=0.8,
     varies_with=("load",),
-    source="dissertation, Eq. (54): k_u = A exp(B d0), B < 0",
+    source="dissertation, Eq. (54): k_u = A exp(B d0), B < 0, at every place of the sidewall",
 )
 def sidewall_load(state: State, strength: float) -> State:
-    """Radial stiffness of the sidewall falls as the tire is pressed.
+    """Radial stiffness of the sidewall falls where the tire is pressed in.
 
-    k_u exp(-s (d0 / 20 mm - 1)): s is the relative fall from 20 to 40 mm, about; B = -s / 20 mm.
+    Its tangent is k_u exp(-s w / 20 mm) where the belt is pressed in by w; B = -s / 20 mm. Eq. (54)
+    has one stiffness for the whole tire, that of its deflection; a sidewall softens where it is
+    pressed, and its force is the integral k_u (1 - exp(-s w / 20 mm)) 20 mm / s. The linear ring
+    takes the secant at the deflection.
     """
-    return state.but(k_u=state.k_u * np.exp(-strength * (state.deflection / REFERENCE - 1.0)))
+    return state.but(softening=state.softening + strength / FALL)

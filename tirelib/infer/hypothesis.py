@@ -20,8 +20,10 @@ from tirelib.infer.plain import BASE, ROUGHLY, Family, View
 from tirelib.infer.posterior import Posterior
 from tirelib.infer.problem import Problem
 
-LAWS = (0.075, 0.15)
-"""Relative standard deviations by which laws are off: a hypothesis stays if it does with either."""
+LAWS = (0.075, 0.15, 0.3)
+"""Relative standard deviations by which laws are off: a hypothesis stays if it does with any."""
+USUAL = 0.15
+"""That of most laws."""
 LOOSEST = 1.0
 """That which is tried where a hypothesis is rejected: its laws are off by as much as themselves."""
 SLACK = 2.0
@@ -133,7 +135,7 @@ def judged(
     """
     views = [fit.view(problem, own) for own in OWN]
     rough = not all(effect.exact for effect in fit.effects)
-    usual, loose = (LAWS, (LOOSEST,)) if rough else (LAWS[-1:], ())
+    usual, loose = (LAWS, (LOOSEST,)) if rough else ((USUAL,), ())
     levels = {law: _likelihoods(views, fit, families, law) for law in usual}
     likelihood = max(max(each) for each in levels.values())
     laws = sorted(usual, key=lambda law: -max(levels[law]))
@@ -154,7 +156,8 @@ def judged(
 def _null(view: View, fit: Posterior, family: Family, law: float) -> Null:
     wide = fit.widths**2
     wide[len(fit.point.base) :] *= PRIOR**2
-    return Null(view, family, family.spread(fit.sizes), {BASE: wide, **law_errors(fit, law)})
+    allowed = {BASE: wide, **law_errors(fit, law)}
+    return Null(view, family, family.spread(fit.sizes), allowed, fit.sides)
 
 
 def _likelihoods(
@@ -249,7 +252,7 @@ def law_errors(fit: Posterior, law: float) -> dict[str, float | FloatArray]:
 def plausible(fit: Posterior, own_effects: int) -> bool:
     """Return whether the strengths of the further effects lie in their ranges."""
     for k, effect in enumerate(fit.effects):
-        slack = SLACK * np.hypot(fit.std(k), LAWS[-1] * np.linalg.norm(fit.strengths[k]))
+        slack = SLACK * np.hypot(fit.std(k), USUAL * np.linalg.norm(fit.strengths[k]))
         low, high = effect.low - slack, effect.high + slack
         inside = (fit.strengths[k] >= low) & (fit.strengths[k] <= high)
         if k >= own_effects and not inside.all():

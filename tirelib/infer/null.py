@@ -9,8 +9,9 @@ a_j at its likeliest with its prior, k the size of what this tire shows of every
 the misfit which each run has for itself. Were the model of plain tires exact, L_j would be a chi-
 square of as many degrees of freedom n_j as a_j has components; the cube root makes chi-squares of
 different n_j comparable (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684). The largest of
-these standard scores is what stands out. The model of plain tires is not exact: how large scores
-get on plain tires is measured (`tirelib.infer.hypothesis`).
+these standard scores is what stands out. An effect whose range lies on one side of zero may stand
+out on the other one: then something else is there. The model of plain tires is not exact: how large
+scores get on plain tires is measured (`tirelib.infer.hypothesis`).
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -28,6 +29,10 @@ PRIOR = 0.5
 """Standard deviation of a further effect's strength, in ranges."""
 MORE = 8.0
 """Variance of a group of shapes beyond that of plain tires, over theirs."""
+OPPOSITE = 0.5
+"""What a score counts on the side of zero where the effect's range is not, as sidewalls that harden
+where they are pressed: something else is there, which plain tires show more often than an effect
+and which gets no name. Half and double of it: docs/theory/inference.md, "Numbers that decide"."""
 SIZES = 2.0 ** np.arange(-2, 2)
 """Sizes of what one tire shows over what its family shows, among which its likelihood chooses. A
 tire that leaves little shows a weak effect; one that leaves far more than its family has something
@@ -78,6 +83,8 @@ class Null:
         What its tires show in the plan (`Family.spread`).
     allowed : mapping of block to variance
         What the hypothesis leaves open beside that.
+    sides : mapping of block to sign
+        Effects of one number whose range lies on this side of zero.
 
     Attributes
     ----------
@@ -93,9 +100,11 @@ class Null:
         family: Family,
         shown: Mapping[str, float],
         allowed: Mapping[str, float | FloatArray],
+        sides: Mapping[str, float],
     ) -> None:
         blocks = view.normal.blocks
         self.view, self.family, self.shown, self.allowed = view, family, shown, allowed
+        self.sides = sides
         self.names = [name for name in blocks if name != BASE]
         self.blocks = [blocks[name] for name in self.names]
         self.counts = np.array([block.stop - block.start for block in self.blocks], dtype=float)
@@ -122,7 +131,7 @@ class Null:
         return self._weighed[int(np.argmax(self._levels))][1]
 
     def ratios_of(self, products: Products, *, given: int | None = None) -> FloatArray:
-        """Return L_j / n_j of k residuals, (n_names, k).
+        """Return L_j / n_j of k residuals, (n_names, k); negative on the side of no effect's range.
 
         Parameters
         ----------
@@ -130,7 +139,14 @@ class Null:
         given : int, optional
             Place of a further effect that the hypothesis counts with.
         """
-        plain, free = [], []
+        sided = [
+            (self.names.index(name), side)
+            for name, side in self.sides.items()
+            if name in self.names
+        ]
+        rows = [j for j, _ in sided]
+        first, side = [self.blocks[j].start for j in rows], np.array([each for _, each in sided])
+        plain, free, signs = [], [], []
         for level, weighed in self._at(products):
             gram, here = weighed.gram, weighed.right(products[0])
             if given is not None:
@@ -144,8 +160,13 @@ class Null:
                     for j, block in enumerate(self.blocks)
                 ]
             )
-        gain = np.max(free, axis=0) - np.max(plain, axis=0)
-        return np.asarray(2.0 * gain / self.counts[:, None])
+            signs.append(here[first] * side[:, None] >= 0.0)
+        best = np.argmax(free, axis=0)[None]
+        gain = np.take_along_axis(np.array(free), best, axis=0)[0] - np.max(plain, axis=0)
+        ratios = np.asarray(2.0 * gain / self.counts[:, None])
+        inside = np.ones(ratios.shape, dtype=bool)
+        inside[rows] = np.take_along_axis(np.array(signs), best[:, rows], axis=0)[0]
+        return np.where(inside, ratios, -ratios)
 
     def likelihood_of(self, products: Products) -> FloatArray:
         """Return the largest log likelihood of k residuals over the sizes, (k,), [nats]."""
@@ -172,7 +193,7 @@ class Null:
 
     def about(self, view: View, size: "Size | None" = None) -> "Null":
         """Return the same test of other normal equations, at one size of what the tire shows."""
-        other = Null(view, self.family, self.shown, self.allowed)
+        other = Null(view, self.family, self.shown, self.allowed, self.sides)
         if size is not None:
             other._weighed = [each for each in other._weighed if each[0] == size]
         return other
@@ -190,8 +211,9 @@ class Null:
         return scores
 
     def standard(self, ratios: FloatArray) -> FloatArray:
-        """Return the standard scores of L_j / n_j, (n_names, k)."""
-        return standard(ratios, self.counts[:, None])
+        """Return the standard scores of signed L_j / n_j, (n_names, k)."""
+        scores = standard(np.abs(ratios), self.counts[:, None])
+        return np.where((ratios < 0.0) & (scores > 0.0), OPPOSITE * scores, scores)
 
     @property
     def scores(self) -> FloatArray:

@@ -23,7 +23,7 @@ ROUNDS = 60
 SETTLED = 0.01
 """Relative change of all variances below which they are learned."""
 START = 0.02**2
-EVEN = 0.5
+EVEN = 0.25
 """Least that a tire shows of one block, over what its family shows of all on the average: what
 forty tires of one family hardly show, those of another may. It counts as a change of what is
 measured, in which one effect is as good as another, and does not hold where families cover each

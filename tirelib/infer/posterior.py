@@ -110,6 +110,12 @@ class Posterior:
         """Mean squares of the rows of everything that plain tires may show, by block."""
         return _sizes(self.rows)
 
+    @property
+    def sides(self) -> dict[str, float]:
+        """Signs of effects of one number whose range lies on one side of zero, by name."""
+        one = (e for e in self.point.effects if e.components == 1 and e.low * e.high == 0.0)
+        return {effect.name: effect.toward for effect in one}
+
     def strength(self, name: str) -> FloatArray | None:
         """Return the strength of an effect, of the model or beside it; None if it has none."""
         pairs = zip(self.point.effects, self.point.strengths, strict=True)

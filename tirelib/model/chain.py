@@ -114,6 +114,7 @@ def at_depth(state: State, constants: Sequence[Change], depth: FloatArray) -> St
 def _alike(a: State, b: State) -> bool:
     """Return whether two states have the same constants, whatever their deflections."""
     pairs = [(getattr(a, name), getattr(b, name)) for name in CONSTANTS]
+    pairs.append((a.ring.radial_stiffness, b.ring.radial_stiffness))
     return all(x is y or np.array_equal(x, y, equal_nan=True) for x, y in pairs)
 
 

@@ -55,6 +55,7 @@ def made_of(values: Values, points: Operating) -> Made:
         tension=_tension(v, points),
         k_u=v["radial_stiffness"] + v["radial_pressure_slope"] * above,
         k_v=v["tangential_stiffness"] + v["tangential_pressure_slope"] * above,
+        softening=0.0,
         dashpots=0.0,
         k_t=v["tread_stiffness"],
         hardening=v["tread_hardening"],

@@ -40,7 +40,7 @@ from tirelib.waveforms import GRID
 Values = Mapping[str, float | FloatArray]
 SAME = (
     *("radius", "free_radius", "EI", "mass", "rotary_inertia", "k_u", "k_v"),
-    *("dashpots", "k_t", "hardening", "thickness"),
+    *("softening", "dashpots", "k_t", "hardening", "thickness"),
 )
 """Constants of the rolling ring that a state holds under the same name."""
 LINEAR_ONLY = ("damping", "inertia_share")

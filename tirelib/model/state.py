@@ -83,7 +83,7 @@ class State:
     conditions : Operating
     radius, free_radius, width, thickness, offset : shape (n_points,), [m]
         Ring radius R, free radius R0, belt width b, tread thickness h0, gage offset y < 0.
-    EI, mass, tension_pressure, k_u, k_v, damping, EA, GA, rotary_inertia, inertia_share, tension,
+    EI, mass, tension_pressure, k_u, k_v, softening, damping, EA, GA, rotary_inertia, inertia_share, tension,
     dashpots
         Parameters of the ring (`tirelib.ring.ring.Ring`); tension_pressure is p of the tension p b
         R, and GA is the tire's less that tension.
@@ -117,6 +117,7 @@ class State:
     tension_pressure: FloatArray
     k_u: FloatArray
     k_v: FloatArray
+    softening: FloatArray
     damping: FloatArray
     EA: FloatArray
     GA: FloatArray
@@ -158,6 +159,7 @@ class State:
             tension_pressure=conditions.pressure,
             k_u=column("radial_stiffness") + column("radial_pressure_slope") * above,
             k_v=column("tangential_stiffness") + column("tangential_pressure_slope") * above,
+            softening=np.zeros(n),
             damping=column("damping"),
             EA=column("extension_stiffness"),
             GA=column("shear_stiffness"),
@@ -207,7 +209,7 @@ class State:
             bending_stiffness=self.EI,
             mass=self.mass,
             inflation=self.tension_pressure * self.width,
-            radial_stiffness=self.k_u,
+            radial_stiffness=self.k_u * self._secant,
             tangential_stiffness=self.k_v,
             damping=self.damping,
             dashpots=self.dashpots,
@@ -217,6 +219,13 @@ class State:
             inertia_share=self.inertia_share,
             tension=self.tension,
         )
+
+    @property
+    def _secant(self) -> FloatArray:
+        """The softening sidewall's secant over its tangent at rest: the linear ring's share."""
+        fall = self.softening * self.deflection
+        safe = np.where(fall == 0.0, 1.0, fall)
+        return np.where(self.softening == 0.0, 1.0, -np.expm1(-fall) / safe)
 
     @property
     def tread(self) -> Tread:

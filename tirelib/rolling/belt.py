@@ -12,7 +12,8 @@ What the tension T has beside p b R is held by a radial force T / R of the sidew
 its direction: where plies pull inward, T is negative.
 Material streams through the steady shape with Omega; its acceleration is Omega^2 r'', which holds
 centrifugal and Coriolis terms. The pressure follows the deformed belt. The sidewall's springs and
-dashpots act between belt and rim, both in the turning frame.
+dashpots act between belt and rim, both in the turning frame. Where the belt is pressed in, the
+sidewall may soften: its radial force is k_u (exp(c u) - 1) / c, whose tangent is k_u exp(c u).
 """
 
 import numpy as np
@@ -24,7 +25,7 @@ Fields = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, Float
 U, V, PSI, DU, DV, DPSI = range(6)
 CONSTANTS = (
     *("radius", "EA", "GA", "EI", "mass", "rotary_inertia", "inflation", "tension"),
-    *("k_u", "k_v", "dashpots", "omega"),
+    *("k_u", "k_v", "softening", "dashpots", "omega"),
 )
 """Constants that belt and sidewall are made of."""
 
@@ -50,7 +51,7 @@ def forces(z: FloatArray, k: Constants) -> FloatArray:
     radius, omega = c["radius"], c["omega"]
     damp_u, damp_v = _dashpots(c)
     push = c["inflation"] * belt.a + c["tension"]
-    out[U] = by_a - push + radius * (c["k_u"] * z[U] + damp_u * z[DU])
+    out[U] = by_a - push + radius * (c["k_u"] * _pressed(c, z[U]) + damp_u * z[DU])
     out[V] = -by_c + c["inflation"] * belt.c + radius * (c["k_v"] * z[V] + damp_v * z[DV])
     out[DU], out[DV] = by_c, by_a
     out[PSI] = belt.N * belt.across - belt.Q * belt.along
@@ -89,7 +90,7 @@ def stiffness(z: FloatArray, k: Constants) -> FloatArray:
     for j, t in b:
         out[V, j] += t * c["inflation"]
     damp_u, damp_v = _dashpots(c)
-    out[U, U] += radius * c["k_u"]
+    out[U, U] += radius * c["k_u"] * np.exp(c["softening"] * z[U])
     out[V, V] += radius * c["k_v"]
     out[U, DU] += radius * damp_u
     out[V, DV] += radius * damp_v
@@ -143,6 +144,12 @@ class _Belt:
         blown = c["inflation"] * radius + c["tension"]
         self.N = blown + c["EA"] * (self.along / radius - 1.0)
         self.Q = c["GA"] * self.across / radius
+
+
+def _pressed(c: dict[str, FloatArray], u: FloatArray) -> FloatArray:
+    """Return the sidewall's radial force over k_u, [m]: u where it does not soften."""
+    soft = np.broadcast_to(c["softening"], u.shape)
+    return np.divide(np.expm1(soft * u), soft, out=u.copy(), where=soft != 0.0)
 
 
 def _dashpots(c: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:

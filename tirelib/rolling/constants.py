@@ -11,7 +11,7 @@ from tirelib.errors import ParameterError
 _POSITIVE = frozenset(
     {"radius", "free_radius", "EA", "GA", "EI", "mass", "k_t", "thickness", "half_width", "load"}
 )
-_SIGNED = frozenset({"tension", "torque", "hardening", "omega", "poisson"})
+_SIGNED = frozenset({"tension", "torque", "hardening", "omega", "poisson", "softening"})
 STIFFEST = 1e8
 """EA and GA that stand for infinite ones, [N]: strains below 1e-4."""
 
@@ -33,6 +33,8 @@ class Constants:
         (`tirelib.rolling.belt`).
     k_u, k_v : [N/m^2]
         Sidewall, radial and tangential.
+    softening : [1/m]
+        c of the sidewall's radial tangent stiffness k_u exp(c u), u outward.
     dashpots : [-]
         lambda of c = 2 lambda sqrt(k rho A), for k_u and k_v.
     k_t : [N/m^2]
@@ -64,6 +66,7 @@ class Constants:
     tension: FloatArray
     k_u: FloatArray
     k_v: FloatArray
+    softening: FloatArray
     dashpots: FloatArray
     k_t: FloatArray
     hardening: FloatArray

@@ -10,7 +10,6 @@ from scipy.stats import norm
 from tests.physics.test_effects import BASE, FREE_ROLLING, PLAN, TIRE, VALUES, run, tangents, wave
 from tirelib.arrays import FloatArray
 from tirelib.contact.fourier import evaluate
-from tirelib.contact.radial import press
 from tirelib.effects import CATALOGUE
 from tirelib.errors import ParameterError
 from tirelib.model.base import linearised, predict
@@ -31,14 +30,12 @@ def changed(state: State, **given: Any) -> np.ndarray:
     return state.waveform - (wave(**given) if given else BASE)
 
 
-def test_sidewall_load_turns_about_twenty_millimetres() -> None:
-    at_reference = press(compliance(run().ring, PLAN.points.omega), run().tread, 0.020).load
-    points = replace(PLAN.points, load=at_reference)
-    state, base = at("sidewall_load", 0.5, points=points), run(points=points)
-    np.testing.assert_allclose(state.deflection, base.deflection, rtol=1e-6)
-    depth = run().deflection
-    softer = at("sidewall_load", 0.1).deflection > depth
-    np.testing.assert_array_equal(softer, depth > 0.020)
+def test_sidewall_load_takes_the_secant_of_its_tangent_in_the_linear_ring() -> None:
+    state = at("sidewall_load", 0.5)
+    fall = 0.5 * state.deflection / 0.020
+    secant = (1.0 - np.exp(-fall)) / fall
+    np.testing.assert_allclose(state.ring.radial_stiffness, state.k_u * secant)
+    assert (state.deflection > run().deflection).all()
 
 
 def test_sidewall_pressure_departs_to_the_same_side_above_and_below_two_bar() -> None:

@@ -33,6 +33,24 @@ def plain(families: tuple[Family, ...]) -> Hypothesis:
     return judged(toy, fit, families, 0.05, own_effects=0)
 
 
+def test_what_is_on_the_side_of_no_effect_is_unknown_and_counts_half(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A twist is 0 to 2: less than none is not a twist, and something is there all the same."""
+    toy = Toy(drawn(np.random.default_rng(2), twist=-1.0))
+    fit = posterior(toy, (), FAMILIES[0].shown(), 0.001)
+    found = judged(toy, fit, FAMILIES, 0.05, own_effects=0)
+    assert found.p <= 0.05
+    half = found.scores
+    monkeypatch.setattr(null, "OPPOSITE", 1.0)
+    whole = judged(toy, fit, FAMILIES, 0.05, own_effects=0).scores
+    assert half["twist"] == pytest.approx(0.5 * whole["twist"])
+    assert half["bend"] == whole["bend"]
+    more = Toy(drawn(np.random.default_rng(2), twist=1.0))
+    fit = posterior(more, (), FAMILIES[0].shown(), 0.001)
+    assert judged(more, fit, FAMILIES, 0.05, own_effects=0).scores["twist"] > 5.0
+
+
 def test_a_family_unlike_the_others_raises_the_limit() -> None:
     """Its tires are judged by what the others show, in whose units they stand out."""
     alike, unlike = plain(FAMILIES), plain((*FAMILIES, LOUD))
@@ -90,8 +108,8 @@ def test_what_a_tire_shows_at_least_does_not_depend_on_the_unit_of_a_strength() 
     turned = other.spread({**sizes, "a": sizes["a"] / 9.0})
     assert turned["a"] == pytest.approx(9.0 * usual["a"])
     assert turned["b"] == pytest.approx(usual["b"])
-    # half of what all show on the average; the family does not know the user's own effect
-    least = 0.25 * float(np.mean([2.0 * 1e-8, 4e-4, 0.5 * 1e-6]))
+    # a quarter of what all show on the average; the family does not know the user's own effect
+    least = 0.25**2 * float(np.mean([2.0 * 1e-8, 4e-4, 0.5 * 1e-6]))
     at_least = shown.spread({**sizes, "own": 3.0})
     assert at_least["b"] == 4e-4
     assert 2.0 * at_least["a"] == pytest.approx(least)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.unit.identify.model_waves import operating
-from tirelib.infer.strain_laws import as_large, law_errors
+from tirelib.infer.strain_laws import GOES, PLACED, as_large, law_errors
 from tirelib.waveforms import GRID
 
 LOAD = np.array([2000.0, 4000.0, 6000.0])
@@ -36,7 +36,7 @@ def test_an_effect_may_act_a_little_ahead(share: float) -> None:
     errors = law_errors(BUMP[None], HALF, POINTS, 3)
     moved = np.exp(-0.5 * ((GRID + share * HALF[:, None]) / (0.5 * HALF[:, None])) ** 2)
     # two terms of a Taylor series in the half contact are among the errors
-    terms = errors[4:6]
+    terms = errors[4:6] / PLACED
     assert moved - BUMP == pytest.approx(share * terms[0] + share**2 * terms[1], abs=1e-3)
     assert share_outside(moved - BUMP, terms) < 0.02
 
@@ -52,13 +52,21 @@ def test_an_effect_may_be_sharper() -> None:
 def test_an_effect_may_go_otherwise_with_load_about_its_mean() -> None:
     with_load = law_errors(BUMP[None], HALF, POINTS, 3)[0]
     factor = np.log(LOAD) - np.log(LOAD).mean()
-    assert with_load == pytest.approx(factor[:, None] * BUMP)
+    assert with_load == pytest.approx(GOES * factor[:, None] * BUMP)
 
 
 def test_errors_of_runs_ahead_count_from_the_mean_of_those_that_are_measured() -> None:
     two = law_errors(BUMP[None], HALF, POINTS, 2)[0]
     factor = np.log(LOAD) - np.log(LOAD[:2]).mean()
-    assert two == pytest.approx(factor[:, None] * BUMP)
+    assert two == pytest.approx(GOES * factor[:, None] * BUMP)
+
+
+def test_a_law_may_be_wrong_opposite_to_the_contact() -> None:
+    """What a heavy spot does, and gets wrong, ends nowhere."""
+    turn = np.cos(GRID) * np.ones((3, 1))
+    errors = law_errors(turn[None], HALF, POINTS, 3)
+    far = np.exp(-0.5 * ((GRID - 2.3) / 0.4) ** 2) * np.ones((3, 1))
+    assert share_outside(far - far.mean(), errors) < 0.25
 
 
 def test_errors_grow_with_the_effect() -> None:

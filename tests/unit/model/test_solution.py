@@ -97,13 +97,23 @@ def test_tension_beyond_the_spinning_belts_own_is_what_less_inertia_leaves() -> 
 
 
 def test_constants_follow_the_deflection_that_they_cause() -> None:
-    effect = CATALOGUE["sidewall_load"]
-    found = at(GRIPPING, [effect.at(0.4)])
-    again = made_with(GRIPPING, POINTS, [effect.at(0.4)[1]], found.deflection)
+    def falls(state: State) -> State:
+        return state.but(k_u=state.k_u * np.exp(-0.4 * (state.deflection / 0.020 - 1.0)))
+
+    found = at(GRIPPING, [("constants", falls)])
+    again = made_with(GRIPPING, POINTS, [falls], found.deflection)
     assert found.made.constants.k_u == pytest.approx(again.constants.k_u, rel=1e-6)
     # softer than at no strength where the tire is pressed beyond 20 mm, stiffer where less
     change = found.deflection - at(GRIPPING).deflection
     assert (change[found.deflection > 0.021] > 0.0).all()
+
+
+def test_a_sidewall_that_softens_acts_on_the_rolling_ring_at_every_place() -> None:
+    effect = CATALOGUE["sidewall_load"]
+    found = at(GRIPPING, [effect.at(0.4)])
+    assert found.made.constants.softening == pytest.approx([20.0] * len(POINTS))
+    assert found.made.constants.k_u == pytest.approx(at(GRIPPING).made.constants.k_u)
+    assert (found.deflection > at(GRIPPING).deflection).all()
 
 
 def test_what_the_rolling_ring_has_not_is_what_the_linear_one_changes() -> None:
