@@ -190,6 +190,7 @@ def _constants(tire: RingTire, settings: Sequence[Setting], load: Array, omega: 
         tension=-tire.pull * inflation * tire.ring_radius,
         k_u=tire.radial * pressure + tire.radial_offset,
         k_v=tire.tangential * pressure + tire.tangential_offset,
+        softening=0.0,
         dashpots=0.0,
         k_t=tire.k_t,
         hardening=tire.hardening,

@@ -169,7 +169,7 @@ def test_sidewalls_that_pull_leave_the_belt_round_and_keep_their_direction(
     np.testing.assert_allclose(moment, -pull * radius**2 * np.sin(turn), atol=1e-9)
 
 
-def test_a_sidewall_softens_where_it_is_pressed_and_pushes_with_the_integral_of_its_tangent() -> None:
+def test_a_softening_sidewall_pushes_with_the_integral_of_its_tangent() -> None:
     soft, hard = ring(load=4000.0, softening=40.0), ring(load=4000.0)
     z = np.zeros((6, 1, 5))
     z[0, 0] = np.linspace(-0.03, 0.0, 5)

@@ -3,7 +3,6 @@
 import numpy as np
 
 from tirelib.compare.error import ModelError
-from tirelib.identify.span import span
 from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.plain import BASE
 
@@ -24,12 +23,10 @@ def floor_of(error: ModelError, hypothesis: Hypothesis, alpha: float) -> float:
     """
     if hypothesis.p > alpha or error.whiten is None:
         return error.value
-    more, _ = hypothesis.null.beside(hypothesis.against)
-    rows = hypothesis.fit.rows
-    further = np.tensordot(more, rows[hypothesis.against], axes=1)[None]
-    taken, *own = error.whiten(np.concatenate([further, rows[BASE]])).reshape(
-        1 + len(rows[BASE]), -1
+    null, rows = hypothesis.null, hypothesis.fit.rows
+    blocks, move = null.view.normal.blocks, null.moved(hypothesis.against)
+    taken = sum(
+        np.tensordot(move[blocks[name]], rows[name], axes=1) for name in (BASE, hypothesis.against)
     )
-    basis = span(np.array(own).T)
-    left = error.whiten(error.rest).ravel() - taken + basis @ (basis.T @ taken)
+    left = error.whiten((error.rest - taken)[None])
     return min(error.value, float(np.sqrt(np.mean(left**2))))

@@ -250,6 +250,18 @@ class Null:
         covariance = np.asarray(np.linalg.inv(inner), dtype=float)
         return covariance @ weighed.right(self.view.normal.right)[block], covariance
 
+    def moved(self, name: str) -> FloatArray:
+        """Return how coefficients of all rows move, (m,), if a further effect is there.
+
+        Those of the effect itself (or of more of a group) are from zero.
+        """
+        weighed, right = self.likeliest, self.view.normal.right
+        block, spread = self.blocks[self.names.index(name)], weighed.root**2
+        spread[block] += self._more(self.names.index(name), weighed)
+        after, before = Weighed(self.view.normal, spread).mean(right), weighed.mean(right)
+        before[block] = 0.0
+        return after - before
+
     def angle(self, one: str, other: str) -> float:
         """Return the smallest angle between two effects' signatures as this test weighs them."""
         a, b = (self.blocks[self.names.index(name)] for name in (one, other))

@@ -83,8 +83,8 @@ class State:
     conditions : Operating
     radius, free_radius, width, thickness, offset : shape (n_points,), [m]
         Ring radius R, free radius R0, belt width b, tread thickness h0, gage offset y < 0.
-    EI, mass, tension_pressure, k_u, k_v, softening, damping, EA, GA, rotary_inertia, inertia_share, tension,
-    dashpots
+    EI, mass, tension_pressure, k_u, k_v, softening, damping, EA, GA, rotary_inertia, inertia_share,
+    tension, dashpots
         Parameters of the ring (`tirelib.ring.ring.Ring`); tension_pressure is p of the tension p b
         R, and GA is the tire's less that tension.
     k_t, hardening
