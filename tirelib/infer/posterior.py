@@ -107,8 +107,12 @@ class Posterior:
 
     @property
     def sizes(self) -> dict[str, float]:
-        """Mean squares of the rows of everything that plain tires may show, by block."""
-        return _sizes(self.rows)
+        """Mean squares of the rows of everything that plain tires may show, by block.
+
+        The model's own effects are among them, so that hypotheses of other effects have the same
+        average of all blocks (`Family.spread`).
+        """
+        return _sizes(self.rows, self.effects)
 
     @property
     def sides(self) -> dict[str, float]:
@@ -316,15 +320,18 @@ def sizes_at_start(problem: Problem) -> dict[str, float]:
     )
     solved = problem.solve(point)
     rows, _ = explaining(problem, point, solved, len(problem.start.effects))
-    return _sizes(rows)
+    return _sizes(rows, problem.start.effects)
 
 
-def _sizes(rows: Mapping[str, FloatArray]) -> dict[str, float]:
-    return {
-        name: float(np.mean(each**2))
-        for name, each in rows.items()
-        if name != BASE and not name.startswith(ROUGHLY)
-    }
+def _sizes(rows: Mapping[str, FloatArray], own: Sequence[Effect]) -> dict[str, float]:
+    """Return mean squares of rows; those of the model's own effects end the block of the base."""
+    first = len(rows[BASE]) - sum(effect.components for effect in own)
+    each: dict[str, FloatArray] = {}
+    for effect in own:
+        each[effect.name] = rows[BASE][first : first + effect.components]
+        first += effect.components
+    each |= {k: v for k, v in rows.items() if k != BASE and not k.startswith(ROUGHLY)}
+    return {name: float(np.mean(block**2)) for name, block in each.items()}
 
 
 def _start(

@@ -69,3 +69,15 @@ def test_a_fit_from_one_nearby_ends_where_one_from_the_start_does() -> None:
     assert near.cost == pytest.approx(far.cost, abs=0.1)
     point = near.point
     np.testing.assert_allclose(base.slopes_at(point), toy.slopes(point, near.solved))
+
+
+def test_what_a_tire_shows_at_least_is_the_same_beside_every_hypothesis() -> None:
+    """The average over all blocks is, with an effect in the model, that without it."""
+    toy = Toy(0.7 * Toy(np.zeros(N)).by["swell"][0])
+    alone = posterior(toy, [], SPREAD, 0.001).sizes
+    inside = posterior(toy, [EFFECTS["swell"]], SPREAD, 0.001).sizes
+    assert inside == pytest.approx(alone)
+    shown = FAMILIES[0].spread(inside)
+    assert shown["bend"] == pytest.approx(FAMILIES[0].spread(alone)["bend"])
+    del inside["swell"]
+    assert FAMILIES[0].spread(inside)["bend"] < 0.9 * shown["bend"]
