@@ -93,10 +93,10 @@ def test_all_wheels_alarms_what_is_in_use_and_the_zero_of_the_gages(
             assert part in said
         page.keyboard.press("3")
         wait_for(page, "tirebench.wheel === 2 && !tirebench.all")
-        use = {
-            cell.get_attribute("data-use"): cell.inner_text()
-            for cell in page.locator("#use-list dd[data-use]").all()
-        }
+        cells = page.locator("#use-list dd[data-use]")  # read at once: the page writes them anew
+        use = dict(
+            cells.evaluate_all("each => each.map((cell) => [cell.dataset.use, cell.innerText])")
+        )
         assert use == {
             "speed": "64.8 km/h bus",
             "pressure": "2.30 bar option",

@@ -26,7 +26,7 @@ VERBS = {
     "explain": "Find what a model of CAMPAIGN lacks, add it, and show before and after.",
     "effects": "List the effects of the catalogue, or register effects of your own.",
     "next-test": "Tell which further run would separate the suspects of CAMPAIGN best.",
-    "add": "Add EFFECT to a model, fit it to CAMPAIGN and show how the error changes.",
+    "add": "Add effects to a model, fit it to CAMPAIGN and show how the error changes.",
     "selftest": "Plant each effect at the plan and noise of CAMPAIGN and count how often it is "
     "found.",
     "studio": "See in the browser where a model fails, add the effect that is missing, take it "

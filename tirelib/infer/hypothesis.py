@@ -20,7 +20,7 @@ from tirelib.infer.plain import BASE, ROUGHLY, Family, View
 from tirelib.infer.posterior import Posterior
 from tirelib.infer.problem import Problem
 
-LAWS = (0.075, 0.15, 0.3)
+LAWS = (0.03, 0.1, 0.3)
 """Relative standard deviations by which laws are off: a hypothesis stays if it does with any."""
 USUAL = 0.15
 """That of most laws."""

@@ -153,7 +153,7 @@ class _Forecast:
             if name not in rival.names and name in null.names
         ]
         now = null.measured
-        before = null.ratios_of(now)[further, 0]
+        before = np.abs(null.ratios_of(now))[further, 0]
         count = null.counts[further, None]
         runs = int(self.ahead.run_ahead.max()) + 1
         chance, rise, std = np.zeros(runs), np.zeros(runs), np.zeros(runs)
@@ -165,7 +165,9 @@ class _Forecast:
             tested = _with(null, rows)
             ratios = tested.ratios_of((now[0] + rows @ rest.T, now[1] + np.sum(rest**2, axis=1)))
             chance[run] = np.mean(tested.standard(ratios).max(axis=0) > limit)
-            gained = np.max(count * (ratios[further] - before[:, None]), axis=0, initial=0.0)
+            gained = np.max(
+                count * (np.abs(ratios[further]) - before[:, None]), axis=0, initial=0.0
+            )
             rise[run], std[run] = gained.mean(), gained.std()
         return chance, rise, std
 

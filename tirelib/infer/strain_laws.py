@@ -61,7 +61,9 @@ def law_errors(
     square = np.sum(rows**2, axis=0)
     mean = np.mean(square, axis=1, keepdims=True)
     size = np.sqrt(0.5 * mean + 0.5 * _nearby(square, half_angle))
-    shape = bumps(GRID / half_angle[:, None], KNOTS, float(np.pi / half_angle.mean())) * size
+    shape = (
+        bumps(GRID / half_angle[:, None], KNOTS, float(np.pi / half_angle[:present].mean())) * size
+    )
     shape = SHAPED * (shape - shape.mean(axis=2, keepdims=True))
     by_load = shape * conditions[0, :, None]
     by_speed = SHAPED_BY_SPEED / SHAPED * shape * conditions[1, :, None]

@@ -23,7 +23,7 @@ class Covered(Toy):
         super().__init__(measured)
         random = np.random.default_rng(21)
         self.ways = random.standard_normal((WAYS, N))
-        off = 0.2 * LAW * random.standard_normal(WAYS) @ self.ways
+        off = 0.6 * LAW * random.standard_normal(WAYS) @ self.ways
         self.by["bend"] = self.by["twist"] + off
 
     def roughly(
