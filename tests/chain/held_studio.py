@@ -1,7 +1,7 @@
 """`tirelib studio` whose refits stop after their first steps while the file of HOLD exists.
 
-With words it is the server; without, the process of one job. A test is in the middle of a refit for
-as long as it likes, on a machine of any speed.
+Called with arguments this program is the server, and without any it is the process of one job. So a
+test stays in the middle of a refit for as long as it likes, on a machine of any speed.
 """
 
 import os

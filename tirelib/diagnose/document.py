@@ -24,7 +24,7 @@ NO_REPEATS = (
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Assessment(Assessed):
-    """A diagnosis of strain as it is told; without folds if nothing is named.
+    """What the document of a strain diagnosis holds; it has no folds if nothing is named.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""A diagnosis as it is told, of strain or of forces, and what the documents of both hold alike."""
+"""What the documents of diagnoses hold, and which part strain and forces share."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ FORMAT = "tirelib-diagnosis/1"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Assessed:
-    """A diagnosis as it is told.
+    """What the document of a diagnosis holds.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Assessed:
 
     @property
     def factor(self) -> float:
-        """By which errors on what was held out become errors as they are told."""
+        """Factor from errors on what was held out to errors in the unit of the document."""
         return 1.0
 
     def held_out(self, fit: Any) -> tuple[float, ...]:

@@ -72,7 +72,7 @@ def additions(
     catalogue : mapping
         Effects by name.
     diagnosis : Assessment or ForceAssessment, optional
-        Of this campaign and model, whose fits serve.
+        A diagnosis of this campaign and model: its fits are used.
     failed : callable, optional
         Called for an effect that cannot be added, which is then left out.
     progress : callable, optional

@@ -41,7 +41,7 @@ def force_extension_document(done: ForceExtension, file: TireFile) -> dict[str, 
 
 
 def _errors(done: ForceExtension) -> dict[str, float]:
-    """Return the errors of a step as they are told."""
+    """Return the errors of a step in the unit of the document."""
     case = done.case
     return {
         "error_before": done.given,

@@ -1,4 +1,4 @@
-"""A diagnosis of forces as it is told: from a campaign and a model file."""
+"""What the document of a force diagnosis holds, from a campaign and a model file."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -74,7 +74,7 @@ class ForceCase:
 
     @property
     def factor(self) -> float:
-        """By which an rms in SI becomes an error as it is told."""
+        """Factor from an rms in SI to an error in the unit of the document."""
         return 1.0 / self.noise if np.isfinite(self.noise) else 1.0
 
     def rms(self, values: Mapping[str, float], changes: Changes) -> float:
@@ -83,7 +83,7 @@ class ForceCase:
         return float(np.sqrt(np.mean(rest**2)))
 
     def error(self, fit: ForceFit) -> float:
-        """Return the error of a fitted brush as it is told."""
+        """Return the error of a fitted brush in the unit of the document."""
         return self.factor * self.rms(fit.values, fit.changes)
 
     def told(self, part: float, fit: ForceFit) -> float:
@@ -167,7 +167,7 @@ def _lack(case: ForceCase) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ForceAssessment(Assessed):
-    """A diagnosis of a force as it is told.
+    """What the document of the diagnosis of one force holds.
 
     Attributes
     ----------
@@ -182,7 +182,7 @@ class ForceAssessment(Assessed):
 
     @property
     def factor(self) -> float:
-        """By which an rms in SI becomes an error as it is told."""
+        """Factor from an rms in SI to an error in the unit of the document."""
         return self.case.factor
 
     def error_with(self, finding: Finding) -> float:
