@@ -30,7 +30,7 @@ from tirelib.threads import one_thread
 LEVEL = 0.05
 LARGEST = 1.3
 """Error ratio of the campaigns with something hidden, at most: larger ones are seen by all."""
-NUMBERS = ("PRIOR", "MORE", "SIZES", "SIZE_STD", "OWN", "EVEN")
+NUMBERS = ("PRIOR", "MORE", "SIZES", "SIZE_STD", "OWN", "OPPOSITE", "EVEN")
 
 
 @contextmanager
