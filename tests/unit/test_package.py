@@ -3,6 +3,7 @@
 import ast
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -20,10 +21,17 @@ def declared(*extras: str) -> set[str]:
     return {line.split(">")[0].split("=")[0].split("[")[0] for each in lists for line in each}
 
 
+@cache
+def nodes(file: Path) -> list[ast.AST]:
+    """Return the imports of a file and its texts."""
+    wanted = (ast.Import, ast.ImportFrom, ast.Constant)
+    return [node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, wanted)]
+
+
 def imported(folder: Path) -> set[str]:
     found: set[str] = set()
     for file in folder.rglob("*.py"):
-        for node in ast.walk(ast.parse(file.read_text())):
+        for node in nodes(file):
             if isinstance(node, ast.Import):
                 found |= {name.name.partition(".")[0] for name in node.names}
             elif isinstance(node, ast.ImportFrom) and not node.level:
@@ -42,6 +50,39 @@ def test_everything_that_is_imported_is_declared(
     folder: str, extras: tuple[str, ...], own: set[str]
 ) -> None:
     assert imported(ROOT / folder) - own <= declared(*extras)
+
+
+def modules(root: Path) -> dict[str, Path]:
+    return {
+        ".".join(file.relative_to(root.parent).with_suffix("").parts): file
+        for file in root.rglob("*.py")
+        if not file.name.startswith("__")
+    }
+
+
+def named(file: Path) -> set[str]:
+    """Return the modules that a file imports or names in a text, as what imports late does."""
+    found: set[str] = set()
+    for node in nodes(file):
+        if isinstance(node, ast.Import):
+            found |= {name.name for name in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module, *(f"{node.module}.{name.name}" for name in node.names)}
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            found.add(node.value)
+    return found
+
+
+def test_every_module_is_used_or_documented_for_users() -> None:
+    """A verb, an FMU or the bench uses it; else it is on the page of the Python interface."""
+    roots = [ROOT / "tirelib", ROOT / "bench" / "tirebench"]
+    ours = {name: file for root in roots for name, file in modules(root).items()}
+    files = [file for root in (*roots, ROOT / "fmu_src") for file in root.rglob("*.py")]
+    used = set().union(*(named(file) for file in files))
+    page = (ROOT / "docs" / "reference" / "api.md").read_text()
+    documented = {line.split()[-1] for line in page.splitlines() if "automodule" in line}
+    commands = {name for name in ours if name.split(".")[1] == "cli"}
+    assert sorted(set(ours) - used - documented - commands) == []
 
 
 def test_the_core_declares_nothing_that_the_library_does_not_import() -> None:
