@@ -37,9 +37,10 @@ MOST_LOST, MOST_LOST_SHORT = 1.1, 1.5
 """Good frames for each damage. A line of RAW12C has 22 characters: a damage of up to 20
 often strikes two of them."""
 MOST_WRONG_TEXT = 2e-4
-"""Of a text, for each cut or insertion: a digit and a CR may be put in where a line ends anyway."""
+"""Share of wrong lines that a cut or an insertion may leave in a text: a digit and a CR may be put
+in where a line ends anyway."""
 MOST_GROWTH = 8 * 2**20
-"""Of memory, [bytes]: what an allocator keeps back."""
+"""Growth of the memory that an allocator may keep back, [bytes]."""
 LENGTH = tuple(kind for kind in KINDS if kind not in CHANGED)
 
 

@@ -63,7 +63,7 @@ EVERY = 600.0
 WARM = 1800.0
 """Memory is judged from here on, [s]."""
 MOST_GROWTH = 8 * 2**20
-"""Of memory, [bytes]: what an allocator keeps back."""
+"""Growth of the memory that an allocator may keep back, [bytes]."""
 MOST_PPM = 1.0
 """How far the clock fit may be off, [ppm]; its own scatter with these arrivals is 0.2 ppm."""
 CLEAN_FZ = 1e-9

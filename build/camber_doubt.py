@@ -37,7 +37,7 @@ CAMBERS = (-3.0, -1.5, -0.75, 0.0, 0.75, 1.5, 3.0)
 ANGLES = (-2.5, 0.0, 2.5)
 SEED = 31
 SPEED = 20.0
-"""Of the cars, [m/s]."""
+"""Speed of the cars, [m/s]."""
 
 
 def tilted() -> Plan:

@@ -20,7 +20,7 @@ from tirelib.threads import one_thread
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "docs" / "tutorials"))
 LOADS = np.arange(1700.0, 7400.0, 380.0)
-"""Of the day that is estimated, [N]."""
+"""Loads of the day that is estimated, [N]."""
 LEVELS = (4, 5, 6, 7, 9)
 ANGLES = (-4, -2, 0, 2, 4)
 SEEDS = (1, 3)

@@ -45,7 +45,7 @@ OMEGA = 59.0
 LOADS = np.array([1500.0, 3000.0, 4500.0, 6000.0])
 """[N]."""
 DEFLECTIONS = np.array([0.01, 0.02, 0.03, 0.04])
-"""Of the standing ring, [m]."""
+"""Deflections of the standing ring, [m]."""
 DEPTHS = [f"{1e3 * d0:g} mm" for d0 in DEFLECTIONS]
 AROUND = np.radians(np.linspace(-60.0, 60.0, 481))
 Panels = list[Axes]

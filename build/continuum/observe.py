@@ -12,7 +12,7 @@ from continuum.solve import State
 from continuum.tire import STRIP, STRIPS
 
 POINTS = 3600
-"""Of a trace round the wheel."""
+"""Points of a trace round the wheel."""
 ZIGZAG = 1e-4
 """Alternation of the strain between elements above which a state is refused [1]; 29 of 30
 drawn tires stay below 7e-6, one has 6.1e-5. Elements four times as large show more than 3e-5 of

@@ -17,7 +17,7 @@ SMALLEST, LARGEST = 1e-9, 4e-3
 KEPT = 1e-5
 """Below this step the stiffness is not factored again, as long as steps fall fast [m]."""
 ITERATIONS, HALVINGS = 15, 4
-"""Of Newton's method, and of the way from a start that is too far off."""
+"""Most steps of Newton's method, and most halvings on the way from a start that is too far off."""
 
 CREEPS = (0.03, 0.01)
 """Creep of the friction on the way to a tire's own."""
@@ -56,7 +56,7 @@ class State:
 
     @property
     def height(self) -> float:
-        """Of the axle over the road [m]."""
+        """Height of the axle over the road [m]."""
         return self.balance.height
 
 

@@ -106,7 +106,7 @@ class Tire:
 
     @property
     def belt_thickness(self) -> float:
-        """Of a homogeneous layer with this EI and EA [m]."""
+        """Thickness of a homogeneous layer with this EI and EA [m]."""
         return float(np.sqrt(12.0 * self.bending / self.extension))
 
     @property

@@ -28,7 +28,7 @@ from tirelib.signal import LowPass, cut_turns
 from tirelib.threads import one_thread
 
 DENSITY = 1000.0
-"""Of water [kg/m^3]."""
+"""Density of water [kg/m^3]."""
 LOADS = (2700.0, 3100.0, 3500.0, 3900.0, 4300.0, 4700.0)
 WEDGES = (0.0, 6e4, 1.2e5, 1.8e5, 2.4e5)
 """Loads [N] and pressures of the wedge [Pa] that are solved."""

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 WHEELS = ("FL", "FR", "RL", "RR")
 """Order of the wheels in every array: front left, front right, rear left, rear right."""
 TREAD_DEPTH = 0.008
-"""Of the virtual tire, which is new [m]."""
+"""Tread depth of the virtual tire, which is new [m]."""
 PRESSURE = 2.3e5
 """Inflation pressure where a vehicle has none [Pa]."""
 OWN_FRICTION = START[FRICTION]

@@ -8,7 +8,7 @@ from section import Section, Target, section
 
 LOADS = (1500.0, 3000.0, 4500.0, 6000.0, 7500.0)
 SLACK_LOADS = (250.0, 500.0, 1000.0, 1500.0, 2000.0)
-"""Of a tire without inflation pressure, [N]."""
+"""Loads of a tire without inflation pressure, [N]."""
 TARGETS = {
     "solid": Target(),
     "blocks": Target(along=0.02),

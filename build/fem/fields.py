@@ -24,7 +24,7 @@ class State:
     road_load: float
     """The same from the contact stresses, [N]."""
     deflection: float
-    """Of the inflated tire's outer radius, [m]."""
+    """Deflection of the inflated tire at its outer radius, [m]."""
     phi: Floats
     """Material angles of the strains, [rad]."""
     strain: Floats

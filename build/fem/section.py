@@ -26,11 +26,11 @@ class Target:
     outer_offset: float = 0.0135
     liner_offset: float = -0.0033
     core_thickness: float = 0.001
-    """Of the stiff layer in the middle of the belt: the thinner, the less it stretches."""
+    """Thickness of the stiff layer in the belt's middle: the thinner, the less it stretches."""
     coat_modulus: float = 60.0e6
     liner_modulus: float = 6.0e6
     poisson: float = 1.0 / 3.0
-    """Of all rubber, in plane stress. 1/3 makes the shear stiffness a third of kt."""
+    """Ratio of all rubber, in plane stress. 1/3 makes the shear stiffness a third of kt."""
     along: float = 1.0
     """Modulus of the tread along the circumference over the radial one: 1 is solid rubber, a
     small number is a tread cut into blocks."""
@@ -66,7 +66,7 @@ class Layer:
         return self.along * self.modulus * width * (self.outer - self.inner)
 
     def radial_compliance(self, radius: float, width: float) -> float:
-        """Of the layer between two circles, per length of the middle line, [m^2/N]."""
+        """Compliance of the layer between two circles, per length of the middle line, [m^2/N]."""
         ratio = (radius + self.outer) / (radius + self.inner)
         return radius * float(np.log(ratio)) / (self.confined * width)
 

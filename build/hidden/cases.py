@@ -31,11 +31,11 @@ from tirelib.waveforms import Waveforms
 
 NONE = "none"
 VERSION = 7
-"""Of everything that decides a case's numbers; raised when a law or the plan changes."""
+"""Version of all that decides a case's numbers; raised when a law or the plan changes."""
 NODES = 1
 """The same of solved states with one effect."""
 TOLERANCE = 0.1
-"""Of ratio - 1, relative."""
+"""Error that ratio - 1 may have, relative."""
 ACCEPTED = 0.25
 """The same after the last correction; the reached ratio stands in the case."""
 CORRECTIONS = 10

@@ -40,9 +40,9 @@ from tirelib.planning.force_rivals import (
 from tirelib.planning.next_test import force_next_test
 
 NOISE = 8.0
-"""Of a point's side force [N]."""
+"""Noise of a point's side force [N]."""
 ANGLE_NOISE, LOAD_NOISE, PRESSURE_NOISE = 2e-4, 0.003, 0.003
-"""Of a run, alike in all its points: slip angle [rad], load and pressure (relative)."""
+"""Errors of a run, alike in all its points: slip angle [rad], load and pressure (relative)."""
 SPEED, PAUSE, PACE = 11.0, 12.0, 0.8
 """[m/s], and [s] from run to run and from point to point of a sweep."""
 LOADS, PRESSURES = (700.0, 1500.0, 2300.0), (0.7e5, 0.83e5, 0.96e5)

@@ -20,7 +20,8 @@ CONFUSABLE = np.deg2rad(45.0)
 REFERENCE = 1000
 """Seed of the tire at which pairs are chosen."""
 REACHED = (0.5, 2.0)
-"""Of the wanted visibility; beyond, the effect cannot be planted and the case is left out."""
+"""Visibility that is accepted, in units of the wanted one. Beyond these bounds the effect cannot be
+planted, and the case is left out."""
 Pair = tuple[str, str, str]
 """Plan and two look-alikes."""
 

@@ -51,7 +51,7 @@ STAGES = {
     "chosen": "advised",
     "second": "advised, one or two",
 }
-"""Of a case, and as the table tells them."""
+"""Kinds of runs of a case, with their words in the table."""
 Verdict = dict[str, Any]
 
 

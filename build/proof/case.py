@@ -23,7 +23,7 @@ from tirelib.signal import LowPass
 from tirelib.waveforms import Waveforms
 
 LOAD, PRESSURE = 4800.0, 2.1e5
-"""Of the press test."""
+"""Load and pressure of the press test."""
 HELD_OUT_EVERY = 4
 """Seeds that are identified twice more without some runs, to save time."""
 

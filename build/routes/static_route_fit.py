@@ -16,7 +16,7 @@ WIDEST = 0.3
 LEVEL = 3.84
 """Rise of the cost (in variances) at the ends of a 95 % interval."""
 STEP = 1e-5
-"""Of difference quotients, in coordinates."""
+"""Step of difference quotients, in coordinates."""
 UNEVEN = 0.3
 """Departure of a profile from the parabola, relative, from which it is called not quadratic."""
 

@@ -24,11 +24,11 @@ TERMS = 60
 SMALL = 1e-5
 """Amplitude of a harmonic for which the deformation is asked, [m]."""
 NODES = 41
-"""Of the finite differences over the contact."""
+"""Nodes of the finite differences over the contact."""
 COMPARED = 9
 """Nodes in half a contact at which deformations are compared; the filter leaves no more."""
 DEFLECTION_STD = 3e-4
-"""Of the measured deflection's zero, [m]."""
+"""Standard deviation of the measured deflection's zero, [m]."""
 OFFSET_STD = 0.05
 """Relative, of the gages' distance from the neutral line, unless the tire file knows better."""
 UNIT = 1e-4

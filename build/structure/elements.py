@@ -34,7 +34,7 @@ def _law(name: str) -> Any:
 
 
 _BLANK = EFFECTS["temperature"].shown
-"""Of effects that act on the tire: gages show what there is."""
+"""What gages show of effects that act on the tire: the tire's own strain."""
 
 
 class Elements:

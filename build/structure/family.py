@@ -17,7 +17,7 @@ from tirelib.campaign import TireGeometry
 Array = NDArray[np.float64]
 
 POINTS = 1440
-"""Of a frame round the wheel: eight times what the waveform's filter passes."""
+"""Points of a frame round the wheel: eight times what the waveform's filter passes."""
 LATERAL = np.array([-0.06, -0.03, 0.0, 0.03, 0.06])
 """Gages across the width, y to the left [m]."""
 PHI: Array = np.asarray(-np.pi + 2.0 * np.pi / POINTS * np.arange(POINTS), dtype=np.float64)

@@ -16,7 +16,7 @@ FLATTENED = 0.7
 ACROSS = 0.4
 """Strain across per strain along, with the other sign: rubber between cords."""
 ROW = np.deg2rad(72.0)
-"""Of the neighbour's gages behind ours."""
+"""Angle of the neighbour's gages behind ours."""
 
 
 def rotated(frame: Frame, tire: Any, angle: float, strength: float) -> Frame:

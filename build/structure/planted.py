@@ -21,7 +21,7 @@ from tirelib.waveforms import Waveforms
 
 ROUNDS = 14
 ACCEPTED = 0.05
-"""Of ratio - 1, relative."""
+"""Error that ratio - 1 may have, relative."""
 WITHIN = 2.0
 """Factor between two solved strengths from which a third is solved."""
 

@@ -21,7 +21,7 @@ from tirelib.model.solution import slopes_of, solved
 from tirelib.waveforms import Waveforms
 
 DELAY_STD = 1.0
-"""Of the delay, in units of `tirelib.identify.delay`: all but free."""
+"""Standard deviation of the delay, in units of `tirelib.identify.delay`: all but free."""
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ class InProcess:
 
     @property
     def timeline(self) -> Timeline:
-        """Of the first wheel that was heard."""
+        """Timeline of the first wheel that was heard."""
         return next(iter(self.wheels.heard.values())).timeline
 
     def push(self, data: bytes, arrival: int = 0) -> list[Turn]:

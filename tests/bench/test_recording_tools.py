@@ -34,7 +34,7 @@ from tirebench.wire.device import Device
 from tirebench.wire.timeline import Samples
 
 PERIOD = 100_000
-"""Of the samples, [ns]."""
+"""Period of the samples, [ns]."""
 MODULES = os.environ.get("MCAP_MODULES", "")
 READER = Path(__file__).parents[2] / "build" / "mcap_index.cjs"
 

@@ -25,7 +25,7 @@ NEAR_CONTACT = 0.6
 """The strain is compared at wheel angles up to here, [rad]; beyond, it is smooth and small."""
 HEADROOM = 1.2
 FLOOR = 0.003
-"""Of a bound, where a deviation happens to be near zero: the reference is no better."""
+"""Least bound, where a deviation happens to be near zero: the reference is no better."""
 POINTS = np.array([0.2, 0.4, 0.6, 0.8])
 """Where shear is compared, as shares of the reference's edge."""
 

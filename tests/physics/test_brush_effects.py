@@ -34,7 +34,7 @@ NAMES = [
     "combined_slip",
 ]
 DRIFTS = ["stiffness_drift", "friction_drift"]
-"""Of two components; registration tries them."""
+"""Effects of two components; registration tries them."""
 FORCES = ("Fx", "Fy", "Mz")
 MINE = '''
 from tirelib.effects import effect

@@ -94,7 +94,7 @@ SHEARED = {
         "largest pressure": (-0.0029, -0.0073, 0.0010, 0.0106, 0.0223),
     },
 }
-# Of the ring with 64 modes. With 48 the belt's bend at the contact's ends rang all round the turn,
+# With 64 modes; with 48 the belt's bend at the contact's ends rang all round the turn,
 # by 1 % of the centre tension and 3 % of the deepest compression, so that some readings at single
 # angles fell on the continuum by chance of phase, and were smaller than those of the resolved ring.
 # `test_these_distances_are_the_ring_s_and_not_of_its_resolution` holds them against 96 modes.

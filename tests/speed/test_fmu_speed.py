@@ -30,7 +30,7 @@ SAMPLES = 10
 ROUNDS = 8
 STEPS = int(os.environ.get("TIRELIB_STEPS", "300000"))
 CYCLES = int(os.environ.get("TIRELIB_CYCLES", "200"))
-"""Of the memory test: 10 million steps and 1,000 instances take ten minutes."""
+"""Steps and cycles of the memory test: 10 million steps and 1,000 instances take ten minutes."""
 _EMPTY = """
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
 

@@ -33,7 +33,7 @@ BORDER = ("near", "growth", "far")
 """What a model's border says, each from 0."""
 HIGHEST_POWER = 12
 FEWEST_POINTS = 64
-"""Of a reference turn."""
+"""Fewest points of a reference turn."""
 
 
 def faults(document: Mapping[str, Any]) -> Iterator[str]:

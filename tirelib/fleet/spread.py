@@ -15,7 +15,7 @@ from tirelib.arrays import BoolArray, FloatArray
 
 FALSE_ALARM = 0.05
 """Chance that a page of tires that differ by chance alone marks any value as standing out, and the
-same for changes. Of pages of 12 equal tires 7 % mark one (200 pages); with half of it 3.5, with
+same for changes. Among 200 pages of 12 equal tires 7 % mark one; with half of this chance 3.5, with
 double 9.5 %, and a tire 5 scatters away is found in 65, 52 and 78 %
 (``python build/fleet_constants.py``)."""
 FEWEST_SPREAD = 5

@@ -28,7 +28,7 @@ LENGTHS = (0.5, 1.0, 2.0)
 LOAD_LENGTHS = (0.3, 1.0)
 """Over the logarithms of load and pressure."""
 SHARES = (0.0, 0.5, 0.9, 0.99, 0.999)
-"""Of the misfit's variance that is smooth."""
+"""Shares of the misfit's variance that are tried as its smooth part."""
 EVEN = 0.1
 CAMBER_LENGTH = 0.1
 FEWEST_FREEDOMS = 3

@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 TYPICAL_TOLERANCE = Tolerance(0.005, 0.002, 0.001, 0.003)
-"""Of set points, where a campaign does not say its own."""
+"""Tolerance of set points, where a campaign does not say its own."""
 
 STRUCTURE = 0.016
 """White part of the structural misfit, relative to the rms strain."""
@@ -66,7 +66,7 @@ class StraightRuns:
 
     @property
     def tolerance(self) -> Tolerance:
-        """Of the set points: the campaign's, else the typical one."""
+        """Tolerance of the set points: the campaign's, else the typical one."""
         return self.waves.header.tolerance or TYPICAL_TOLERANCE
 
     def data(self, *, with_deflection: bool = True) -> Data:

@@ -17,7 +17,7 @@ from tirelib.model.state import Operating
 REFERENCE_LOAD = 4000.0
 REFERENCE_PRESSURE = 2.0e5
 REFERENCE_OMEGA = 80.0
-"""Of a car's tire at 25 m/s, [rad/s]."""
+"""Angular speed of a car's tire at 25 m/s, [rad/s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class Discrepancy:
 
 
 COARSE = Discrepancy(inside=0.08, outside=0.01)
-"""Of the dissertation's ring, whose belt does not shear."""
+"""Discrepancy of the dissertation's ring, whose belt does not shear."""
 
 
 def bumps(scaled: FloatArray, knots: int, reach: float) -> FloatArray:

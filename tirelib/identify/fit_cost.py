@@ -30,7 +30,7 @@ ZERO = 5e-4
 DEPTH_SHARE = 0.03
 """Structural part of them, in proportion to the deflection."""
 GROWTH = 5e-4
-"""Of the free radius with speed squared, at 30 m/s, [m]."""
+"""Growth of the free radius with speed squared, at 30 m/s, [m]."""
 
 
 @dataclass(frozen=True, slots=True)

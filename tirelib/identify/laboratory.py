@@ -20,7 +20,7 @@ SIDEWALL, MODAL, MASS, TREAD, GROWTH, SECTION = 0.03, 0.01, 0.03, 0.05, 0.05, 0.
 ORDERS = np.arange(1, 9)
 STEP = 1e-5
 LEAST_STIFFNESS = 0.05
-"""Of that at the tire's pressure, below which no test is proposed at another one."""
+"""Share of the stiffness at the tire's pressure, below which no test is proposed at another one."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,7 +35,7 @@ PRESS_SPAN = 0.1
 LEAST_GAIN = 0.9
 """What leaves more of the half-width than this share is no advice."""
 ABOUT_AS_MUCH = 1.6
-"""Of what narrows an interval about as much, within this factor, the least effort is named."""
+"""Tests whose intervals differ by less than this factor are equal; the least effort is named."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from tirelib.ring.ring import Ring
 
 N_MODES = 60
 SAMPLES = 121
-"""Of a pressure profile."""
+"""Samples of a pressure profile."""
 _GRID = (12, 6)
 """Loads and pressures at which the half length is computed for many points."""
 _FEW = 100

@@ -68,7 +68,7 @@ class Hypothesis:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the effects."""
+        """Names of the effects."""
         return self.fit.names
 
     @property

@@ -51,7 +51,7 @@ class Family:
     squares : shape (n_tires, n_blocks)
         Expected mean squares of each block's coefficients; NaN likewise.
     largest : float
-        Most by which one tire shows more of the smooth shapes than its family. Of effects it is
+        Most by which one tire shows more of the smooth shapes than its family; for effects,
         never more than `LARGEST`.
     least : mapping of block to variance
         What the tire may show at least (`covering`). Where it is empty, `spread` says it.

@@ -40,7 +40,7 @@ class Rival(Protocol):
 
     @property
     def name(self) -> str:
-        """Of the effect, or `NOTHING`."""
+        """Name of the effect, or `NOTHING`."""
 
     @property
     def cost(self) -> float:
@@ -68,7 +68,7 @@ class Trial(Protocol):
 
     @property
     def size(self) -> float:
-        """Of the structural misfit; 1 is that of plain tires."""
+        """Size of the structural misfit; 1 is that of plain tires."""
 
 
 @dataclass(frozen=True, slots=True)

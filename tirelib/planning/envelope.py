@@ -98,7 +98,7 @@ class Envelope:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the axes, in the order of the grid's columns."""
+        """Names of the axes, in the order of the grid's columns."""
         return tuple(self.ranges)
 
     @classmethod

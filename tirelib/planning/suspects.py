@@ -39,7 +39,7 @@ class Suspects:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the suspects."""
+        """Names of the suspects."""
         return tuple(effect.name for effect, _ in self.effects)
 
 

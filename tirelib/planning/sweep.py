@@ -16,7 +16,7 @@ from tirelib.identify.force_points import CELL_ANGLE, CELL_RATIO, ForcePoints, s
 LEAST = 4
 """Different slips that make a run one of several points."""
 SHARE = 0.5
-"""Of a campaign's points that are in such runs, from which they are its kind of run."""
+"""Share of a campaign's points in such runs from which on they are its kind of run."""
 _LEVEL = 1000
 """Cells of one set point, in the numbers of `set_points`."""
 

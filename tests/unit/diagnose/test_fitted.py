@@ -29,7 +29,7 @@ from tirelib.waveforms import GRID
 
 DELAY = 4e-5
 LAG = (0.2, 0.02)
-"""Of first order: s_2 = s_1^2 / 2, [ms]."""
+"""Lag of first order: s_2 = s_1^2 / 2, [ms]."""
 
 
 def hypotheses(

@@ -102,7 +102,7 @@ def test_a_contact_run_through_from_behind_changes_ends(features: Features) -> N
 
 
 def test_levels_slopes_and_bows_are_those_of_a_parabola_over_the_width(features: Features) -> None:
-    """Of c + d y + e y^2 over +-1: slope d; bow e whichever gages are left; level of the line."""
+    """With c + d y + e y^2 over +-1: slope d; bow e whichever gages are left; level of the line."""
     y = features.lateral / 0.06
     level, slope, bow = (
         np.linspace(1.0, 2.0, N),

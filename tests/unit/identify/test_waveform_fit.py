@@ -24,7 +24,7 @@ from tirelib.model.solution import slopes_of
 from tirelib.waveforms import GRID
 
 NOISE = 4e-5
-"""Of one gage; with five of them near what structure leaves white in a campaign."""
+"""Noise of one gage; with five of them near what structure leaves white in a campaign."""
 START = TIRE.changed(
     bending_stiffness=1.8,
     radial_stiffness=5.5e5,

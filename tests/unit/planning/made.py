@@ -33,7 +33,7 @@ CONDITIONS = (
 )
 """Speed rises in the order of the runs, so softening with time looks like softening with speed."""
 LEVELS = {"load": 2, "pressure": 2, "speed": 2}
-"""Of the grid of possible runs."""
+"""Levels of the grid of possible runs."""
 AGAIN = (4, 5)
 """Runs that are made twice, at the end."""
 

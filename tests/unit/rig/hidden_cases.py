@@ -19,7 +19,7 @@ CONDITIONS = (
     Condition(4000.0, 2.5e5, 35.0),
 )
 PLACES = (0.4, 1.0, 0.0)
-"""Of the runs in their campaign."""
+"""Places of the runs in their campaign."""
 ANGLE = 1.1
 ON_TIRE = [name for name, effect in HIDDEN.items() if effect.on_tire]
 ON_TRACE = [name for name, effect in HIDDEN.items() if effect.on_trace]

@@ -37,7 +37,7 @@ EXACT = MeasuringChain(
 FAST = Condition(4000.0, 2.3e5, 24.0)
 SLOW = replace(FAST, speed=20.0)
 SECONDS = 0.5
-"""Of a ramp at -8 m/s^2: some seven turns."""
+"""Length of a ramp at -8 m/s^2: some seven turns."""
 
 
 @pytest.fixture(scope="module")

@@ -43,7 +43,7 @@ DRIVING = Wheel(25.0, 26.0, 1.0)
 
 
 def laws(wheel: Wheel, source: str) -> list[AngleLaw]:
-    """Of the turns between contacts whose times are known exactly."""
+    """Laws of the turns between contacts whose times are known exactly."""
     turns = np.arange(2.0 * np.pi, wheel.angle(wheel.time)[-1], 2.0 * np.pi)
     root = np.sqrt(wheel.first**2 + 2.0 * wheel.gain * (turns - np.pi))
     middles = (root - wheel.first) / wheel.gain * RATE

@@ -1,8 +1,9 @@
 """Errors on points that took no part in a fit.
 
-Of a sweep: blocks of time, each in turn; they hold what is told as the held-out error, and the
-highest set points are shown beside. Of steady runs: the highest load, pressure, camber, temperature
-and speed; where none of them can be spared, every fourth cell of conditions in turn.
+In a sweep, blocks of time are held out, each in turn. Their error is the held-out error of the
+diagnosis, and that of the highest set points is shown beside it. In steady runs, the highest load,
+pressure, camber, temperature and speed are held out; where none of them can be spared, every fourth
+cell of conditions in turn.
 """
 
 from collections.abc import Sequence
