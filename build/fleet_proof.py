@@ -27,6 +27,7 @@ from threading import Thread
 
 import psutil
 from distributed import Client, LocalCluster
+from rich.console import Console
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
@@ -44,6 +45,7 @@ from tirelib.fleet.sources import Source  # noqa: E402
 from tirelib.observations import observe  # noqa: E402
 from tirelib.threads import one_thread  # noqa: E402
 
+SAY = Console(highlight=False, soft_wrap=True).print
 PEAK = """
 import resource, sys
 from tirelib.cli.fleet import run_verb
@@ -99,7 +101,7 @@ def recording(folder: Path, hours: Sequence[float]) -> None:
             loads=(4000.0, 5000.0),
             gaps=[(40.0, 40.01), (100.0, 110.0)],
         )
-        (drive / "a.mf4").stat().st_size / 2**20
+        size = (drive / "a.mf4").stat().st_size / 2**20
         table = drive / "turns.parquet"
         command = ["estimate", str(drive), "--calibration", str(known), "--out", str(table)]
         done = subprocess.run(
@@ -107,13 +109,16 @@ def recording(folder: Path, hours: Sequence[float]) -> None:
         )
         if done.returncode:
             raise SystemExit(done.stderr)
+        SAY(f"{length} h, {size:.0f} MiB of recording: {'; '.join(done.stdout.splitlines())}")
         shutil.rmtree(drive)
 
 
 def campaigns(folder: Path, count: int) -> Path:
     """Write campaigns of one short run: the same samples, each with a name of its own."""
     target = folder / "campaigns"
-    first = write(folder / "first", [synthetic_run(1, turns=3.2)])
+    first = folder / "first"
+    if not first.exists():
+        write(first, [synthetic_run(1, turns=3.2)])
     header = (first / "campaign.toml").read_text()
     for number in range(count):
         place = target / f"{number:06d}"
@@ -171,10 +176,14 @@ def memory(folder: Path, counts: Sequence[int]) -> None:
             watch = Peak(client)
             watch.start()
             began = time.monotonic()
-            _check(paths, folder / f"out-{count}", client)
-            time.monotonic() - began
+            counts = _check(paths, folder / f"out-{count}", client)
+            wall = time.monotonic() - began
             watch.going = False
-        ", ".join(f"{peak / 2**20:.0f}" for peak in watch.peak)
+        peaks = ", ".join(f"{peak / 2**20:.0f}" for peak in watch.peak)
+        SAY(
+            f"{count} campaigns, {counts.done} done in {wall:.0f} s: peak memory of client with "
+            f"scheduler and of each worker {peaks} MiB"
+        )
 
 
 def light(
@@ -201,9 +210,14 @@ def scheduler(folder: Path, counts: Sequence[int]) -> None:
         engine.find_sources = lambda paths, sources=sources: sources
         with cluster(2) as client:
             workers_before, before, began = _processor(client), _spent(), time.monotonic()
-            _check(folder, folder / f"out-{count}", client)
-            _wall, _own = time.monotonic() - began, _spent() - before
-            _processor(client) - workers_before
+            counts = _check(folder, folder / f"out-{count}", client)
+            wall, own = time.monotonic() - began, _spent() - before
+            theirs = _processor(client) - workers_before
+        SAY(
+            f"{count} tasks, {counts.done} done in {wall:.0f} s ({count / wall:.0f} a second): "
+            f"client with scheduler {1e3 * own / count:.2f} ms of processor a task, workers "
+            f"{1e3 * theirs / count:.2f} ms"
+        )
 
 
 def _spent() -> float:
@@ -227,8 +241,12 @@ def workers(folder: Path, count: int) -> None:
             recipe = engine.recipe_of("estimate", data, files={"calibration": str(known)})
             engine.run([str(paths / "000000")], data, recipe, client, run_verb)
             before, began = _processor(client), time.monotonic()
-            engine.run([str(paths)], data, recipe, client, run_verb)
-            _wall, _spent = time.monotonic() - began, _processor(client) - before
+            counts = engine.run([str(paths)], data, recipe, client, run_verb)
+            wall, spent = time.monotonic() - began, _processor(client) - before
+        SAY(
+            f"{number} worker(s): {counts.done} done in {wall:.1f} s, {counts.done / wall:.2f} a "
+            f"second; {1e3 * spent / counts.done:.0f} ms of processor a task"
+        )
 
 
 def endurance(folder: Path, minutes: float) -> None:
@@ -250,8 +268,12 @@ def endurance(folder: Path, minutes: float) -> None:
             data.open()
             recipe = engine.recipe_of("check", data, files={})
             engine.run([str(paths)], data, recipe, client, run_verb, report=kill)
-        data.table("container_metrics")["container_id"].to_pylist()
+        found = data.table("container_metrics")["container_id"].to_pylist()
         rounds += 1
+        SAY(
+            f"round {rounds}: {kills} kills so far; {len(set(found))} of 400 campaigns, "
+            f"{len(found) - len(set(found))} twice"
+        )
 
 
 if __name__ == "__main__":

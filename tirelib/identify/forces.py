@@ -2,13 +2,16 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from tirelib.arrays import IntArray
 from tirelib.campaign import Campaign
 from tirelib.errors import TirelibError
+from tirelib.forked import forked
 from tirelib.identify.brush_advice import advice
 from tirelib.identify.brush_estimates import SlipStiffness, estimates_of, slip_stiffness
 from tirelib.identify.brush_fit import BrushFit, fit_brush
@@ -87,8 +90,7 @@ def identify_forces(
     """
     tell = progress or (lambda label: None)
     tell("reading forces")
-    data = force_data(campaign)
-    notes = list(force_notes(campaign))
+    data, notes = _read(campaign)
     if len(data) > MOST_SAMPLES:
         step = -(-len(data) // MOST_SAMPLES)
         notes.append(f"{len(data)} samples: each {step}. is used, {-(-len(data) // step)} in all")
@@ -120,6 +122,13 @@ def identify_forces(
         tuple(notes),
         MappingProxyType(_numbers(campaign, fit, estimates, len(data))),
     )
+
+
+def _read(campaign: Campaign) -> tuple[ForceData, list[str]]:
+    """Return the forces, and what of them cannot be used; both read every run."""
+    read: list[Callable[[], Any]] = [partial(force_data, campaign), partial(force_notes, campaign)]
+    data, notes = forked(read)
+    return data, list(notes)
 
 
 def _with_pressure(data: ForceData, ring: Tire, notes: list[str]) -> tuple[ForceData, Tire | None]:

@@ -13,12 +13,14 @@ observation narrows.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Self
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import TirelibError
+from tirelib.forked import forked
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.fit_cost import nuisance_shapes
 from tirelib.identify.laboratory import Test, laboratory_tests
@@ -143,7 +145,8 @@ def next_run(fit: WaveformFit, structure: FloatArray, discrepancy: Discrepancy |
     """
     state = _State.of(fit, structure)
     points, series = _candidates(fit.cost.data.points)
-    added = [_information(fit, discrepancy, points.take([i])) for i in range(len(points))]
+    each = [points.take([i]) for i in range(len(points))]
+    added = forked([partial(_information, fit, discrepancy, point) for point in each])
     runs = []
     for words, which in series:
         parts = [added[i] for i in which]

@@ -9,11 +9,13 @@ open.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.errors import ConvergenceError, TirelibError
+from tirelib.forked import forked
 from tirelib.identify.bounded import bounded_step
 from tirelib.identify.delay import earlier
 from tirelib.identify.discrepancy import Discrepancy
@@ -301,15 +303,20 @@ class Solver:
     def ridges(self, covariance: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Return 95 % intervals along the ridges, and where the surface is quadratic."""
         size = len(self.free)
+        moves = covariance / np.sqrt(np.diag(covariance))
+        found = forked(
+            [
+                partial(self.rise, sign * PROBE * moves[:, k])
+                for k in range(size)
+                for sign in (-1.0, 1.0)
+            ]
+        )
         interval = np.zeros((size, 2))
         quadratic = np.ones(size, dtype=bool)
-        for k in range(size):
-            deviation = float(np.sqrt(covariance[k, k]))
-            ridge = covariance[:, k] / deviation
-            for side, sign in enumerate((-1.0, 1.0)):
-                root = np.sqrt(max(self.rise(sign * PROBE * ridge), 0.0))
-                # a side that hardly rises is open to three deviations at least
-                reach = 1.96 * PROBE / max(root, 1.96 * PROBE / 3.0)
-                interval[k, side] = sign * deviation * reach
-                quadratic[k] &= bool(abs(root - PROBE) < 0.3)
+        for (k, side), rise in zip(np.ndindex(size, 2), found, strict=True):
+            root = np.sqrt(max(rise, 0.0))
+            # a side that hardly rises is open to three deviations at least
+            reach = 1.96 * PROBE / max(root, 1.96 * PROBE / 3.0)
+            interval[k, side] = (2 * side - 1) * np.sqrt(covariance[k, k]) * reach
+            quadratic[k] &= bool(abs(root - PROBE) < 0.3)
         return interval, quadratic

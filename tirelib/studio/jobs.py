@@ -3,18 +3,16 @@
 import json
 import os
 import re
-import signal
-import subprocess
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from tirelib.studio.commands import KINDS
 from tirelib.studio.disk import write_atomic
+from tirelib.studio.starter import RUNNER, Starter
 
 AT_ONCE = max(1, min(2, (os.cpu_count() or 1)))
 """Jobs that run side by side."""
@@ -22,8 +20,6 @@ TAIL = 4000
 """Characters of a failed command's last words that are kept."""
 MOST_ERRORS = 400
 """Points of the error's fall that a job keeps."""
-RUNNER = (sys.executable, "-m", "tirelib.studio.runner")
-"""Command of the process that waits for a job."""
 _ERROR = re.compile(r"\b(error|cost) (\d+(?:\.\d+)?(?:e[+-]?\d+)?)")
 
 
@@ -115,16 +111,14 @@ class Jobs:
     folder : Path
         One folder for each job: job.json, stdout.txt, stderr.txt, out.
     runner : sequence of str
-        Command of the process that waits for a job.
+        Command of the process that starts jobs.
     """
 
     def __init__(self, folder: Path, runner: Sequence[str] = RUNNER) -> None:
-        self.folder, self._runner = folder, list(runner)
+        self.folder, self._starter = folder, Starter(runner)
         folder.mkdir(parents=True, exist_ok=True)
         self.all: dict[int, Job] = {}
         self.progress: dict[int, Progress] = {}
-        self._processes: dict[int, subprocess.Popen[bytes]] = {}
-        self._spare: subprocess.Popen[bytes] | None = None
         for file in sorted(folder.glob("*/job.json")):
             with suppress(OSError, ValueError, TypeError):
                 job = Job(**json.loads(file.read_text()))
@@ -153,15 +147,15 @@ class Jobs:
     def look(self) -> tuple[list[Job], bool]:
         """Start what may start; return the jobs that have just ended, and whether there is news."""
         ended, news = [], False
-        for number, process in list(self._processes.items()):
+        codes = self._starter.ended()
+        for number in [*codes, *self._starter.running]:
             job, progress = self.all[number], self.progress[number]
-            code = process.poll()
             news |= progress.read(self.place(job) / "stderr.txt")
-            if code is not None:
-                self._finish(job, code)
+            if number in codes:
+                self._finish(job, codes[number])
                 ended.append(job)
         waiting = [job for job in self.all.values() if job.state == "waiting"]
-        for job in waiting[: max(0, AT_ONCE - len(self._processes))]:
+        for job in waiting[: max(0, AT_ONCE - len(self._starter.running))]:
             self._start(job)
             news = True
         return ended, news or bool(ended)
@@ -171,8 +165,7 @@ class Jobs:
         if job.over:
             return
         job.state, job.ended = "cancelled", time.time()
-        if process := self._processes.pop(job.number, None):
-            _kill(process)
+        self._starter.end(job.number)
         self._save(job)
 
     def close(self) -> None:
@@ -182,33 +175,21 @@ class Jobs:
                 self.cancel(job)
                 job.state = "interrupted"
                 self._save(job)
-        if self._spare is not None:
-            _kill(self._spare)
+        self._starter.close()
 
     def warm(self) -> None:
         """Have a process ready, so that the next job starts at once."""
-        if self._spare is None or self._spare.poll() is not None:
-            self._spare = _spawn(self._runner)
+        self._starter.warm()
 
     def _start(self, job: Job) -> None:
-        self.warm()
-        process, self._spare = self._spare, None
-        assert process is not None  # noqa: S101 - warm has set it
         place = self.place(job)
-        words = {"argv": job.argv} | {n: str(place / f"{n}.txt") for n in ("stdout", "stderr")}
-        pipe = process.stdin
-        assert pipe is not None  # noqa: S101 - it is a pipe
-        _send(pipe, words)
-        self._processes[job.number] = process
+        files = {name: str(place / f"{name}.txt") for name in ("stdout", "stderr")}
+        self._starter.start(job.number, {"argv": job.argv, **files})
         self.progress[job.number] = Progress()
         job.state, job.begun = "running", time.time()
         self._save(job)
-        self.warm()
 
     def _finish(self, job: Job, code: int) -> None:
-        process = self._processes.pop(job.number)
-        if process.stdin is not None:
-            process.stdin.close()
         job.ended = time.time()
         kind = KINDS[job.kind]
         made = all((self.out(job) / name).exists() for name in kind.results)
@@ -228,34 +209,3 @@ class Jobs:
 
     def _save(self, job: Job) -> None:
         write_atomic(self.place(job) / "job.json", json.dumps(asdict(job), indent=1))
-
-
-def _spawn(runner: Sequence[str]) -> subprocess.Popen[bytes]:
-    environment = os.environ | {"TIRELIB_PROGRESS": "json", "PYTHONUNBUFFERED": "1"}
-    return subprocess.Popen(
-        list(runner),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env=environment,
-        start_new_session=True,
-    )
-
-
-def _send(pipe: BinaryIO | Any, words: Mapping[str, Any]) -> None:
-    with suppress(OSError):  # a process that has died is seen at the next look
-        pipe.write(json.dumps(words).encode() + b"\n")
-        pipe.flush()
-
-
-def _kill(process: subprocess.Popen[bytes]) -> None:
-    """End a process and its children, and wait until it is gone."""
-    with suppress(OSError):
-        if os.name == "posix":
-            os.killpg(process.pid, signal.SIGKILL)
-        else:
-            process.kill()
-    if process.stdin is not None:
-        with suppress(OSError):
-            process.stdin.close()
-    process.wait()

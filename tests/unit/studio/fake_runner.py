@@ -1,4 +1,4 @@
-"""A process that stands for `tirelib.studio.runner`: it writes at once what a command would write.
+"""`tirelib.studio.runner` whose jobs write at once what a command would write.
 
 While the file of the environment variable HOLD exists, `add` goes on; every command line is noted
 in the file of the environment variable SAID.
@@ -7,9 +7,11 @@ in the file of the environment variable SAID.
 import json
 import os
 import sys
-import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
+
+from tirelib.studio import runner
 
 VERDICT = {
     "format": "tirelib-diagnosis/1",
@@ -39,39 +41,24 @@ WRITES = {
 }
 
 
-def value(words: list[str], option: str) -> Path | None:
+def value(words: Sequence[str], option: str) -> Path | None:
     return Path(words[words.index(option) + 1]) if option in words else None
 
 
-def main() -> int:
-    line = b""
-    while not line.endswith(b"\n"):
-        part = os.read(0, 4096)
-        if not part:
-            return 0
-        line += part
-    order = json.loads(line)
-    threading.Thread(target=lambda: (os.read(0, 1), os._exit(9)), daemon=True).start()
-    words = order["argv"]
+def work(words: Sequence[str]) -> None:
     with Path(os.environ["SAID"]).open("a") as said:
         said.write(json.dumps({"pid": os.getpid(), "argv": words}) + "\n")
     verb = words[1] if words[0] == "campaign" else words[0]
-    with Path(order["stderr"]).open("w") as err:
-        for step in range(1, 100000):
-            told = {
-                "progress": "fitting",
-                "done": step,
-                "total": None,
-                "label": f"error {9 - step}",
-            }
-            err.write(json.dumps(told) + "\n")
-            err.flush()
-            if verb != "add" or not Path(os.environ["HOLD"]).exists():
-                break
-            time.sleep(0.02)
-        if "sidewall_pressure" in words or (verb == "diagnose" and "Fy" in words):
-            err.write("Error: it does not fit; choose another\n")
-            return 2
+    for step in range(1, 100000):
+        label = f"error {9 - step}"
+        told = {"progress": "fitting", "done": step, "total": None, "label": label}
+        sys.stderr.write(json.dumps(told) + "\n")
+        if verb != "add" or not Path(os.environ["HOLD"]).exists():
+            break
+        time.sleep(0.02)
+    if "sidewall_pressure" in words or (verb == "diagnose" and "Fy" in words):
+        sys.stderr.write("Error: it does not fit; choose another\n")
+        sys.exit(2)
     if target := value(words, "--json"):
         target.write_text(json.dumps(WRITES.get(verb, {})))
     if (target := value(words, "--data")) and verb == "compare":
@@ -80,8 +67,7 @@ def main() -> int:
         np.savez(target, angle=np.arange(3.0), quantity=np.array("strain"))
     if (target := value(words, "--out")) and target.suffix == ".toml":
         target.write_text("model = 1\n")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    runner.main(work, loaded=())

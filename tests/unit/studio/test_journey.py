@@ -2,12 +2,18 @@
 
 import json
 import os
+import signal
+import sys
 from pathlib import Path
 
+import pytest
+
 from tests.unit.studio.conftest import RUNNER, Served, until
+from tirelib import __version__
 from tirelib.studio.desk import Desk
 from tirelib.studio.jobs import Jobs, Progress
 from tirelib.studio.session import Session
+from tirelib.studio.starter import Starter
 
 
 def alive(pid: int) -> bool:
@@ -138,15 +144,45 @@ def test_the_fall_of_a_fit_is_read_from_its_steps(tmp_path: Path) -> None:
     assert (progress.measure, progress.errors) == ("cost", [45123.0, 1000.0])
 
 
-def test_a_job_ends_when_its_server_is_gone(tmp_path: Path) -> None:
-    os.environ["HOLD"], os.environ["SAID"] = str(tmp_path / "hold"), str(tmp_path / "said")
-    (tmp_path / "hold").touch()
-    jobs = Jobs(tmp_path / "jobs", RUNNER)
+def add_that_goes_on(folder: Path) -> tuple[Jobs, int]:
+    os.environ["HOLD"], os.environ["SAID"] = str(folder / "hold"), str(folder / "said")
+    (folder / "hold").touch()
+    jobs = Jobs(folder / "jobs", RUNNER)
     jobs.add("add", {"campaign": "c", "model": "m", "effect": "e"}, {})
     jobs.look()
-    process = next(iter(jobs._processes.values()))
-    until(lambda: (tmp_path / "said").exists())
-    assert process.stdin is not None
-    process.stdin.close()  # what the system does with the pipe of a server that was killed
-    assert process.wait(60) == 9
+    until(lambda: (folder / "said").exists() and (folder / "said").read_text().endswith("\n"))
+    return jobs, int(json.loads((folder / "said").read_text())["pid"])
+
+
+def test_a_job_ends_when_its_server_is_gone(tmp_path: Path) -> None:
+    jobs, pid = add_that_goes_on(tmp_path)
+    assert alive(pid)
+    jobs.close()  # closes the pipe, as the system does with that of a server that was killed
+    until(lambda: not alive(pid))
+
+
+def test_jobs_go_on_after_the_process_that_starts_them_was_killed(tmp_path: Path) -> None:
+    jobs, pid = add_that_goes_on(tmp_path)
+    os.kill(int(Path(f"/proc/{pid}/stat").read_text().split()[3]), signal.SIGKILL)
+    until(lambda: not alive(pid))
+    until(lambda: jobs.look()[0])
+    assert jobs.all[1].state == "failed"
+    (tmp_path / "hold").unlink()
+    jobs.add("check", {"campaign": "c"}, {})
+    until(lambda: jobs.look()[0])
+    assert jobs.all[2].message == ""
     jobs.close()
+
+
+@pytest.mark.parametrize("copies", [True, False])
+def test_a_job_is_the_program_itself(tmp_path: Path, copies: bool) -> None:
+    main = f"from tirelib.studio import runner; runner.COPIES = {copies}; runner.main(loaded=())"
+    starter = Starter((sys.executable, "-c", main))
+    files = {name: str(tmp_path / name) for name in ("stdout", "stderr")}
+    starter.start(7, {"argv": ["--version"], **files})
+    assert until(starter.ended) == {7: 0}
+    assert __version__ in (tmp_path / "stdout").read_text()
+    starter.start(8, {"argv": ["nonsense"], **files})
+    assert until(starter.ended) == {8: 2}
+    assert "nonsense" in (tmp_path / "stderr").read_text()
+    starter.close()
