@@ -2,10 +2,10 @@
 
 import json
 import math
-import shutil
 import tempfile
 import zipfile
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 
 from tirelib.errors import FormatError, ParameterError
@@ -103,23 +103,27 @@ def embedded_calibration(fmu: str | Path) -> Calibration:
         If the file is no FMU of this kind, or a sealed one.
     """
     try:
-        with zipfile.ZipFile(fmu) as archive, tempfile.TemporaryDirectory() as folder:
+        with zipfile.ZipFile(fmu) as archive:
             if _sealed(archive):
                 raise FormatError(
                     f"{fmu}: is sealed, so it holds no calibration file; one built without "
                     "--sealed is needed; step this one in any importer, or check it with "
                     "`tirelib fmu check`"
                 )
-            with (
-                archive.open(f"resources/{CALIBRATION}") as source,
-                (Path(folder) / CALIBRATION).open("wb") as target,
-            ):
-                shutil.copyfileobj(source, target)
-            return read_calibration(Path(folder) / CALIBRATION)
+            return _read(archive.read(f"resources/{CALIBRATION}"))
     except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
         raise FormatError(
             f"{fmu}: is not an FMU made by `tirelib fmu build` ({error}); build it again"
         ) from None
+
+
+@lru_cache(maxsize=2)
+def _read(content: bytes) -> Calibration:
+    """Read a calibration's file; the wheels of a vehicle carry the same one, of a megabyte."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / CALIBRATION
+        file.write_bytes(content)
+        return read_calibration(file)
 
 
 def _sealed(archive: zipfile.ZipFile) -> bool:

@@ -1,6 +1,7 @@
 """Waveforms that a model itself has made, with set-point errors, noise and planted differences."""
 
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from tests.synthetic import header
 from tirelib.arrays import FloatArray
 from tirelib.identify.random_effects import angle_slope
 from tirelib.model.base import Operating, smoothed, values_of
-from tirelib.model.solution import solved
+from tirelib.model.solution import Solution, solved
 from tirelib.parameters import TireFile, read_tire
 from tirelib.signal import LowPass
 from tirelib.waveforms import CONDITIONS, GRID, Waveforms
@@ -53,6 +54,27 @@ def points_of(conditions: Sequence[Condition]) -> Operating:
     )
 
 
+@cache
+def off_by(
+    conditions: tuple[Condition, ...],
+    load: tuple[float, ...],
+    pressure: tuple[float, ...],
+    low_pass: LowPass,
+) -> tuple[Solution, Operating]:
+    """Return what the model shows where set points are off by so many tolerances, and those."""
+    true = points_of(
+        [
+            (
+                each[0] * (1.0 + TOLERANCE[0] * more),
+                each[1] * (1.0 + TOLERANCE[1] * higher),
+                each[2],
+            )
+            for each, more, higher in zip(conditions, load, pressure, strict=True)
+        ]
+    )
+    return solved(values_of(model_file().tire), true, low_pass=low_pass), true
+
+
 def waveforms(
     conditions: Sequence[Condition] | None = None,
     *,
@@ -70,12 +92,8 @@ def waveforms(
     nominal = points_of(conditions)
     n = len(nominal)
     off = spread * rng.standard_normal((4, n))
-    load = nominal.load * (1.0 + TOLERANCE[0] * off[0])
-    pressure = nominal.pressure * (1.0 + TOLERANCE[1] * off[1])
-    true = points_of(list(zip(load, pressure, nominal.speed, strict=True)))
     low_pass = LowPass()
-    values = values_of(model_file().tire)
-    shown = solved(values, true, low_pass=low_pass)
+    shown, true = off_by(tuple(conditions), tuple(off[0]), tuple(off[1]), low_pass)
     strain, depth = shown.waveform * (1.0 + TOLERANCE[2] * off[2])[:, None], shown.deflection
     strain = strain + ANGLE * off[3][:, None] * angle_slope(shown.waveform)
     if plant is not None:
