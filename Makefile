@@ -30,7 +30,7 @@ test: $(STAMP)
 # A file to each process; one process more than cores, as tests of the bench and the browser wait.
 # In the order of the folders: what is short, tests/unit, comes last. One thread in each process.
 suite: $(STAMP)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --dist=loadfile \
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest --dist=loadfile \
 		--no-loadscope-reorder --numprocesses=$$($(BIN)/python -c "import os; print(os.cpu_count() + 1)")
 
 lint: $(STAMP)
