@@ -86,6 +86,19 @@ def test_each_fault_of_a_gage_has_its_message(
     says(the_one(check_campaign(folder)), f"runs/{number:03d}.mf4", message)
 
 
+@pytest.mark.parametrize(("share", "dead"), [(0.04, True), (0.06, False)])
+def test_a_gage_with_less_than_a_twentieth_of_the_others_swing_is_dead(
+    write: Write, sound_runs: Runs, share: float, dead: bool
+) -> None:
+    def weak(strain: FloatArray) -> None:
+        swing = np.median(np.ptp(np.delete(strain, 4, axis=0), axis=1))
+        strain[4] *= share * swing / np.ptp(strain[4])
+
+    found = check_campaign(write(changed(sound_runs, 9, with_strain(weak))))
+    said = [str(problem) for problem in found if "strain_5: dead: it varies by" in str(problem)]
+    assert bool(said) == dead
+
+
 @pytest.mark.parametrize("quantum", [1e-7, 2.5e-6, 5e-6, 1e-5, 2e-5])
 def test_equal_samples_of_a_coarse_converter_are_no_rail(
     write: Write, sound_runs: Runs, quantum: float

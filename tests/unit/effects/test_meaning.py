@@ -11,6 +11,7 @@ from tests.physics.test_effects import BASE, FREE_ROLLING, PLAN, TIRE, VALUES, r
 from tirelib.arrays import FloatArray
 from tirelib.contact.fourier import evaluate
 from tirelib.effects import CATALOGUE
+from tirelib.effects.patch import held_shear
 from tirelib.errors import ParameterError
 from tirelib.model.base import linearised, predict
 from tirelib.model.solution import solved
@@ -142,6 +143,23 @@ def test_outward_shear_lowers_the_tension_in_the_contact() -> None:
     assert (changed(at("tread_friction", (0.05, 0.0)))[FREE_ROLLING, GRID.size // 2] < 0).all()
 
 
+def test_a_flat_piece_under_outward_shear_is_compressed_at_the_liner_by_its_bending() -> None:
+    """The shear acts outside the neutral line and the liner lies inside: M y / EI < 0."""
+    assert (changed(at("tread_friction", (0.0, 0.05)))[FREE_ROLLING, GRID.size // 2] < 0).all()
+
+
+def test_a_tread_that_sticks_is_sheared_as_rubber_that_keeps_its_volume() -> None:
+    """A flattened belt holds R phi where the surface would reach R0 phi; E = 2 (1 + nu) G."""
+    state = run()
+    c = state.contact
+    away = c.phi - c.edges.mean(axis=1)[:, None]
+    modulus = state.k_t / (2.0 * (1.0 + 0.5))
+    held = modulus[:, None] * (state.free_radius - state.radius)[:, None] * away
+    sticks = np.abs(held) < 0.99 * c.pressure
+    assert sticks.sum(axis=1).min() > 5
+    np.testing.assert_allclose(held_shear(state)[sticks], held[sticks], rtol=1e-12)
+
+
 def test_a_worn_tread_is_thin_and_stiff_and_keeps_its_modulus() -> None:
     state = at("tread_wear", 0.4)
     assert np.allclose(state.k_t * state.thickness, TIRE.tread_stiffness * TIRE.tread_thickness)
@@ -202,6 +220,14 @@ def test_texture_adds_the_mean_pressure_of_random_heights_in_the_limit_of_small_
     # the slope of delta changes within sigma: second order, beside the quadrature's error
     assert error[0] < 0.03
     assert error[1] < 0.4 * error[0]
+
+
+def test_texture_carries_load_that_the_springs_of_the_tread_do_not() -> None:
+    state = at("roughness", 0.3)
+    assert state.contact.extra is not None
+    texture = -np.pi * TIRE.ring_radius * state.contact.extra[:, 1, 0].real
+    assert (texture > 1e-3 * PLAN.points.load).all()
+    np.testing.assert_allclose(texture + state.contact.load, PLAN.points.load, rtol=1e-6)
 
 
 def test_camber_presses_the_side_toward_which_the_wheel_leans() -> None:

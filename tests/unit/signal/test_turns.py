@@ -21,6 +21,12 @@ def turns_of(strain: np.ndarray, **options: object) -> Turns:
     return cut_turns(strain, RATE, LATERAL, **{"speed": 18.0, **options})
 
 
+def by_numpy(strain: np.ndarray) -> Turns:
+    """Cut turns without the compiled core, which `turns_of` uses where there is one."""
+    cut = TurnCutter(LATERAL, RATE).push(strain, speed=18.0)
+    return stack_turns(cut, np.array(LATERAL), RATE)
+
+
 def has(turns: Turns, flag: TurnFlag, turn: int, gage: int | None = None) -> bool:
     flags = turns.flags[turn] if gage is None else turns.gage_flags[turn, gage]
     return bool(flags & flag)
@@ -260,6 +266,25 @@ def test_a_gage_over_a_lifted_shoulder_shows_no_contact() -> None:
     assert all(has(turns, TurnFlag.REDUCED_GAGES, turn) for turn in range(1, len(turns)))
 
 
+@pytest.mark.parametrize(("share", "dead"), [(0.22, True), (0.28, False)])
+def test_a_gage_is_dead_below_a_quarter_of_the_others_steepness(share: float, dead: bool) -> None:
+    strain, _, _ = record(noise=4e-6)
+    strain[4] = share * strain[1]
+    for turns in (turns_of(strain), by_numpy(strain)):
+        assert has(turns, TurnFlag.DEAD_GAGE, 3, 4) == dead
+
+
+@pytest.mark.parametrize(("angle", "saturated"), [(0.036, False), (0.044, True)])
+def test_a_gage_that_stands_at_its_extreme_is_saturated_from_four_hundredths_of_a_radian(
+    angle: float, saturated: bool
+) -> None:
+    step = 0.001
+    away = np.abs(step * np.arange(-500, 501))
+    window = np.minimum(1.0 - away, 1.0 - 0.5 * angle)[None] * 1e-3
+    _, flags = inspect(window, step)
+    assert bool(flags[0] & int(TurnFlag.SATURATED)) == saturated
+
+
 def test_drift_within_a_turn_is_flagged() -> None:
     strain, _, _ = record()
     n = strain.shape[1]
@@ -277,10 +302,7 @@ def test_a_drift_counts_from_a_twentieth_of_the_swing_in_a_turn(
     strain, _, omega = record()
     passed = omega * np.arange(strain.shape[1]) / RATE / (2.0 * np.pi)
     strain[1] += share * np.ptp(strain[1]) * passed
-    # the compiled core, where there is one, and numpy
-    cut = TurnCutter(LATERAL, RATE).push(strain, speed=18.0)
-    by_numpy = stack_turns(cut, np.array(LATERAL), RATE)
-    for turns in (turns_of(strain), by_numpy):
+    for turns in (turns_of(strain), by_numpy(strain)):
         assert has(turns, TurnFlag.DRIFT, 3, 1) == flagged
 
 
@@ -353,6 +375,35 @@ def test_spikes_away_from_the_contact_do_not_move_the_offset() -> None:
     np.testing.assert_allclose(turns.offset[1:], clean.offset[1:], atol=2e-6)
 
 
+def from_opposite(turns: Turns, turn: int, samples: int, omega: float) -> np.ndarray:
+    """Return the angle of samples from the point opposite the contact of a turn, [rad]."""
+    return np.abs((np.arange(samples) - middle_of(turns, turn)) * omega / RATE + np.pi)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "moves"), [(0.52, 1.2, False), (0.38, 0.48, True)], ids=["outside", "inside"]
+)
+def test_the_offset_is_the_strain_within_half_a_radian_of_the_point_opposite_the_contact(
+    low: float, high: float, moves: bool
+) -> None:
+    strain, _, omega = record(noise=4e-6)
+    clean = turns_of(strain)
+    away = from_opposite(clean, 3, strain.shape[1], omega)
+    changed = strain + 1e-4 * ((low < away) & (away < high))
+    for turns in (turns_of(changed), by_numpy(changed)):
+        moved = np.abs(turns.offset - clean.offset)[3]
+        assert (moved > 1e-7).all() if moves else (moved < 1e-12).all()
+
+
+@pytest.mark.parametrize(("every", "gap"), [(12, False), (8, True)])
+def test_an_offset_needs_nine_tenths_of_its_samples(every: int, gap: bool) -> None:
+    strain, _, omega = record(noise=4e-6)
+    away = from_opposite(turns_of(strain), 3, strain.shape[1], omega)
+    strain[1, (away < 0.5) & (np.arange(strain.shape[1]) % every == 0)] = np.nan
+    for turns in (turns_of(strain), by_numpy(strain)):
+        assert has(turns, TurnFlag.GAP, 3, 1) == gap
+
+
 @pytest.mark.parametrize("rising", [0.0, 1e-4])
 def test_a_gap_opposite_the_contact_leaves_the_next_turn_a_doubt_of_its_offset(
     rising: float,
@@ -364,8 +415,7 @@ def test_a_gap_opposite_the_contact_leaves_the_next_turn_a_doubt_of_its_offset(
     at = middle_of(turns_of(strain), 2) - int(turn / 2.0)
     holed = strain.copy()
     holed[:, at - 100 : at + 100] = np.nan
-    cut = TurnCutter(LATERAL, RATE).push(holed, speed=18.0)  # numpy, which the core must equal
-    for turns in (turns_of(holed), stack_turns(cut, np.array(LATERAL), RATE)):
+    for turns in (turns_of(holed), by_numpy(holed)):
         assert has(turns, TurnFlag.TOO_FEW_GAGES, 2)
         assert np.isnan(turns.offset_std[2]).all()
         assert (turns.flags[3] & int(INVALIDATING)) == 0
@@ -378,8 +428,7 @@ def test_a_gage_whose_swing_is_not_known_does_not_drift() -> None:
     strain, _, _ = record(noise=4e-6)
     at = middle_of(turns_of(strain), 2)
     strain[1, at - 20 : at + 20] = np.nan
-    cut = TurnCutter(LATERAL, RATE).push(strain, speed=18.0)
-    for turns in (turns_of(strain), stack_turns(cut, np.array(LATERAL), RATE)):
+    for turns in (turns_of(strain), by_numpy(strain)):
         assert has(turns, TurnFlag.GAP, 2, 1)
         assert not has(turns, TurnFlag.DRIFT, 2)
 
