@@ -134,7 +134,10 @@ class Desk:
             _move(out, model.place)
             quantity = subject.get("quantity") or self._quantity(opened, model)
             opened.change(current=model.number, quantity=quantity)
-            self._computed(opened, model, quantity)
+            if then := job.order.get("then"):
+                self._add_next(then, opened, model, quantity)
+            else:
+                self._computed(opened, model, quantity)
         elif job.kind in OF_QUANTITY:
             opened = self.session.campaign(subject["campaign"])
             model = opened.model(subject["model"])
@@ -264,13 +267,14 @@ class Desk:
         unknown = [name for name in names if name not in known]
         if not names or unknown:
             raise ParameterError(f"add: {unknown or 'nothing'} is not in the catalogue; tick one")
-        numbers = []
-        for name in names:
-            new = opened.new_model(model.number, "add", name, quantity)
-            self._changed("add", opened, model, new, name, quantity)
-            numbers.append(new.number)
-            model = new
-        return {"models": numbers}
+        return {"models": [self._add_next(names, opened, model, quantity)]}
+
+    def _add_next(self, names: Sequence[str], opened: Opened, model: Model, quantity: str) -> str:
+        """Add the first of some effects; the others follow when its model is there."""
+        new = opened.new_model(model.number, "add", names[0], quantity)
+        then = {"then": list(names[1:])} if names[1:] else {}
+        self._changed("add", opened, model, new, names[0], quantity, **then)
+        return new.number
 
     def _remove(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
         opened, model, quantity = self._model(wish)
@@ -280,9 +284,16 @@ class Desk:
         return {"models": [new.number]}
 
     def _changed(
-        self, kind: str, opened: Opened, model: Model, new: Model, effect: str, quantity: str
+        self,
+        kind: str,
+        opened: Opened,
+        model: Model,
+        new: Model,
+        effect: str,
+        quantity: str,
+        **more: Any,
     ) -> None:
-        order = self._about(opened, model, quantity) | {"effect": effect}
+        order = self._about(opened, model, quantity) | {"effect": effect, **more}
         subject = {"campaign": opened.name, "model": new.number, "quantity": quantity}
         self.jobs.add(kind, order, subject)
 

@@ -15,7 +15,9 @@ from tirelib.studio.disk import write_atomic
 from tirelib.studio.starter import RUNNER, Starter
 
 AT_ONCE = max(1, min(2, (os.cpu_count() or 1)))
-"""Jobs that run side by side."""
+"""Jobs that run side by side; as many that the user asked for wait for none of the others."""
+ASKED = ("add", "remove", "plant", "next-test")
+"""Kinds that the user asks for and waits for; the others follow by themselves, or take long."""
 TAIL = 4000
 """Characters of a failed command's last words that are kept."""
 MOST_ERRORS = 400
@@ -154,10 +156,13 @@ class Jobs:
             if number in codes:
                 self._finish(job, codes[number])
                 ended.append(job)
-        waiting = [job for job in self.all.values() if job.state == "waiting"]
-        for job in waiting[: max(0, AT_ONCE - len(self._starter.running))]:
-            self._start(job)
-            news = True
+        for asked in (True, False):
+            alike = [job for job in self.all.values() if (job.kind in ASKED) == asked]
+            waiting = [job for job in alike if job.state == "waiting"]
+            room = AT_ONCE - sum(job.state == "running" for job in alike)
+            for job in waiting[: max(0, room)]:
+                self._start(job)
+                news = True
         return ended, news or bool(ended)
 
     def cancel(self, job: Job) -> None:

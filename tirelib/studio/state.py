@@ -98,6 +98,7 @@ def _job(desk: Desk, job: Job) -> dict[str, Any]:
         "kind": job.kind,
         "title": KINDS[job.kind].title,
         "effect": job.order.get("effect"),
+        "then": job.order.get("then", []),
         "subject": job.subject,
         "state": job.state,
         "begun": job.begun,

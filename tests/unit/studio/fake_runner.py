@@ -26,7 +26,11 @@ VERDICT = {
     "explanation": {"missing": "A.", "sure": "B.", "error": "C.", "next": "D."},
 }
 WRITES = {
-    "effects": {"effects": [{"effect": "sidewall_load", "stage": "stiffness"}]},
+    "effects": {
+        "effects": [
+            {"effect": name, "stage": "stiffness"} for name in ("sidewall_load", "nonuniformity")
+        ]
+    },
     "check": {"errors": 0, "warnings": 0, "problems": []},
     "show": {"header": {"gage_lateral_mm": [0.0]}, "runs": []},
     "identify": {

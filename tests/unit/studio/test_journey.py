@@ -11,7 +11,7 @@ import pytest
 from tests.unit.studio.conftest import RUNNER, Served, until
 from tirelib import __version__
 from tirelib.studio.desk import Desk
-from tirelib.studio.jobs import Jobs, Progress
+from tirelib.studio.jobs import AT_ONCE, Jobs, Progress
 from tirelib.studio.session import Session
 from tirelib.studio.starter import Starter
 
@@ -65,6 +65,27 @@ def test_two_ticked_effects_are_added_one_after_the_other_and_undo_goes_back(
     assert lines[1] == f"tirelib identify {served.measured} --out M.toml --json M.json"
     assert lines[2].startswith("tirelib add sidewall_load --model M.toml --data ")
     assert lines[2].endswith("--quantity strain --out M2.toml --json M2.json")
+    names = ["nonuniformity", "sidewall_load"]
+    served.do(do="add", campaign=opened, model="001", effects=names)
+    until(lambda: served.campaign(opened)["current"] == "004")
+    third, fourth = served.campaign(opened)["models"][2:]
+    assert (third["parent"], third["action"], third["effect"]) == ("001", "add", names[0])
+    assert (fourth["parent"], fourth["action"], fourth["effect"]) == ("003", "add", names[1])
+    until(lambda: served.campaign(opened)["models"][3]["verdict"])
+    assert served.campaign(opened)["models"][2]["verdict"] is None  # of the last one alone
+
+
+def test_a_refit_does_not_wait_for_what_follows_by_itself(tmp_path: Path) -> None:
+    os.environ["HOLD"], os.environ["SAID"] = str(tmp_path / "hold"), str(tmp_path / "said")
+    (tmp_path / "hold").touch()
+    jobs = Jobs(tmp_path / "jobs", RUNNER)
+    order = {"campaign": "c", "model": "m", "effect": "e", "quantity": "Fy"}
+    for kind in (*["diagnose"] * 5, "add"):
+        jobs.add(kind, order, {})
+    jobs.look()
+    states = [job.state for job in jobs.all.values()]
+    jobs.close()
+    assert states == [*["running"] * AT_ONCE, *["waiting"] * (5 - AT_ONCE), "running"]
 
 
 def test_a_refit_is_cancelled_at_once_and_can_be_run_again(served: Served, opened: str) -> None:

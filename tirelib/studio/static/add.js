@@ -53,7 +53,7 @@ export class Add {
     if (key !== this.jobsKey) {
       this.jobsKey = key;
       fill(this.running, fitting.map((job) => h("div", { class: "card" }, h("div", { class: "row" },
-        h("h2", {}, job.kind === "identify" ? "The base model is fitted" : `${job.kind === "add" ? "Adding" : "Removing"} ${job.effect}`), job.state === "running" ? (this.text = h("span", { class: "quiet", role: "status" }, "begins")) : h("span", { class: "quiet" }, "waits"), h("span", { class: "room" }),
+        h("h2", {}, job.kind === "identify" ? "The base model is fitted" : `${job.kind === "add" ? "Adding" : "Removing"} ${job.effect}${job.then.length ? `, then ${job.then.join(", ")}` : ""}`), job.state === "running" ? (this.text = h("span", { class: "quiet", role: "status" }, "begins")) : h("span", { class: "quiet" }, "waits"), h("span", { class: "room" }),
         h("button", { type: "button", "data-cancel": job.job, onclick: () => wish({ do: "cancel", job: job.job }) }, "Cancel")), job.state === "running" ? this.plot.element : null, h("pre", { class: "small" }, job.command))));
       this.progress();
     }
