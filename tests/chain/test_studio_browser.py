@@ -3,6 +3,7 @@
 The tests of one campaign share what was fitted to it; each can be run alone.
 """
 
+import csv
 import json
 import os
 import re
@@ -208,6 +209,129 @@ def test_in_the_middle_of_a_refit_nothing_is_lost(browser: Any, journey: Journey
         page.context.close()
     fit = journey.document(f"{count + 1:03d}", "fit.json")
     assert shown == [digits(fit["error_after"])] * 2
+
+
+def tab_to(page: Any, selector: str) -> None:
+    """Press Tab until an element has the focus."""
+    for _ in range(300):
+        page.keyboard.press("Tab")
+        if page.evaluate("s => document.activeElement.matches(s)", selector):
+            return
+    raise AssertionError(f"{selector}: Tab does not lead to it")
+
+
+def at_the_keyboard(page: Any, selector: str, key: str = "Enter") -> None:
+    page.locator(selector).first.wait_for()
+    tab_to(page, selector)
+    page.keyboard.press(key)
+
+
+RENAME = """
+([campaign, model]) => fetch("/do", {
+  method: "POST", headers: {"content-type": "application/json"},
+  body: JSON.stringify({do: "mark", campaign, model, label: "mine"}),
+})
+"""
+
+
+def test_five_steps_without_a_mouse(browser: Any, journey: Journey) -> None:
+    with serve(journey.folder) as (_, url):
+        page = page_at(browser, url)
+        at_the_keyboard(page, "button.link")  # 1, the campaign
+        page.locator("#main button.main:enabled", has_text="See where").wait_for()
+        at_the_keyboard(page, "#main button.main:not(#example)")
+        page.locator("#error").wait_for()  # 2
+        tab_to(page, "canvas")
+        page.keyboard.press("ArrowUp")
+        for _ in range(2):
+            page.keyboard.press("Shift+ArrowRight")
+        said = page.locator("#main [role=status]", has_text="% of the squares").inner_text()
+        at_the_keyboard(page, "#main button.main")
+        at_the_keyboard(page, "input[data-effect]", "Space")  # 3
+        name = page.evaluate("document.activeElement.dataset.effect")
+        count = page.evaluate("studio.campaign.models.length")
+        at_the_keyboard(page, "#add")
+        page.locator("#main h2", has_text="The fall of the error").wait_for()  # 4
+        added = f"studio.campaign.models[{count}]"
+        wait_for(
+            page, f"{added}?.effect === '{name}' && {added}.number === studio.campaign.current"
+        )
+        tab_to(page, "#steps a[href^='#/take']")
+        page.evaluate(RENAME, page.evaluate("[studio.wanted, studio.campaign.current]"))
+        wait_for(page, "studio.campaign.models.at(-1).label === 'mine'")  # all is drawn anew
+        page.keyboard.press("Enter")  # 5
+        page.locator("[data-take=model]").wait_for()
+        page.context.close()
+    assert re.match(r"From .* to .*: rms [\d.]+ N, [\d.]+ % of the squares, \d+ values", said)
+
+
+def saved(page: Any, of: Any) -> dict[str, list[str]]:
+    """Click the link CSV of a plot; return the columns of the file."""
+    with page.expect_download() as found:
+        of.get_by_role("button", name="CSV").click()
+    names, *rows = csv.reader(Path(found.value.path()).read_text().splitlines())
+    return {name: [row[k] for row in rows] for k, name in enumerate(names)}
+
+
+def close(found: list[str], wanted: Any) -> bool:
+    return np.allclose([float(x) for x in found], wanted, rtol=1e-6, atol=1e-6)
+
+
+def test_every_plot_gives_its_numbers_as_csv(browser: Any, journey: Journey) -> None:
+    place = next(journey.folder.glob("s/campaigns/*/models")) / "002"
+    data = dict(np.load(place / "Fy" / "plots.npz"))
+    runs = list(data["run"])
+    with serve(journey.folder) as (_, url):
+        page = page_at(browser, url)
+        page.get_by_role("button", name="steady").click()
+        wait_for(page, "!!studio.campaign")
+        page.evaluate("location.hash = '#/add/' + studio.wanted")
+        card = page.locator("[data-model='002']")
+        if (there := card.get_by_role("button", name="Continue from here")).count():
+            there.click()
+        wait_for(page, "studio.campaign.current === '002'")
+        page.locator("#error-after").wait_for()
+        fall = saved(page, page.locator(".card", has=page.locator("svg.waterfall")))
+        page.get_by_role("button", name="Compare two").click()
+        page.locator("dialog canvas").nth(1).wait_for()
+        assert page.locator("dialog").get_by_role("button", name="CSV").count() == 2
+        page.keyboard.press("Escape")
+        page.evaluate("location.hash = '#/see/' + studio.wanted")
+        page.locator("#error").wait_for()
+        cards = page.locator(".card")
+        curve, rest = (
+            saved(page, cards.filter(has=page.locator(".plot")).nth(k)) for k in range(2)
+        )
+        cells = saved(page, cards.filter(has=page.locator(".heat")))
+        page.evaluate("location.hash = '#/suspect/' + studio.wanted")
+        page.locator("tr[data-name] input[data-effect]").first.focus()
+        wait_for(page, "!!studio.campaign.models[1].documents['Fy/traces.npz']")
+        plots = page.locator(".plot, .heat")
+        plots.nth(1).wait_for()
+        for plot in plots.all():
+            assert plot.locator("xpath=ancestor::*[.//button[.='CSV']][1]").count() == 1
+        page.context.close()
+    fit = journey.document("002", "fit.json")
+    errors = next(fall[name] for name in fall if name.startswith("error"))
+    assert close(errors, [fit["error_before"], fit["error_after"]])
+    for table, names in ((curve, ("measured", "model")), (rest, ("difference",))):
+        of = [runs.index(float(run)) for run in table["run"]]
+        *_, last = table.values()
+        columns = list(table.values())[-len(names) :]
+        assert last
+        for name, column in zip(names, columns, strict=True):
+            assert close(column, data[name][of])
+    assert len(rest["run"]) == len(runs)
+    # a cell is the mean of its points: at one load each slip angle was measured twice
+    found = [float(x) for name in list(cells)[1:] for x in cells[name] if x]
+    level = data["level_load"]
+    slips = np.round(data["slip_angle"], 1)
+    pairs = [
+        data["difference"][(level == a) & (slips == b)].mean()
+        for a in np.unique(level)
+        for b in np.unique(slips)
+    ]
+    assert np.allclose(np.sort(found), np.sort(pairs), rtol=1e-4, atol=1e-4)
 
 
 def drop(page: Any, path: Path) -> None:

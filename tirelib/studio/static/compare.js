@@ -1,6 +1,6 @@
 // Two models side by side: their errors, what each leaves as a map in one scale, and every run.
 import { arraysOf, documentOf, nameOf, VERDICTS } from "./data.js";
-import { choose, dialog, fill, h, number, strength, unitName } from "./dom.js";
+import { choose, csvButton, dialog, fill, h, number, strength, unitName } from "./dom.js";
 import { Heat, limitOf } from "./heat.js";
 import { BINS, forceRows, isStrain, niceTicks, strainRows, unitOf } from "./maps.js";
 
@@ -49,7 +49,7 @@ export function compareModels(c, models) {
     const limit = Math.max(...arrays.filter(Boolean).map((data) => limitOf(data.difference)));
     fill(body, h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), both.map((m) => h("th", {}, nameOf(m))))), h("tbody", {}, LINES.map(([text, value]) => h("tr", {}, h("td", {}, text), both.map((m, i) => h("td", {}, value(told[i], m) || "–")))))),
       h("h3", {}, `What each leaves: model less measured${arrays[0] || arrays[1] ? ` [${unitOf(arrays[0] || arrays[1])}]` : ""}, one scale`),
-      h("div", { class: "two" }, both.map((m, i) => h("div", {}, h("div", { class: "small" }, nameOf(m)), arrays[i] ? heats[i].element : h("p", { class: "quiet" }, "It has not been compared yet: continue from it once.")))),
+      h("div", { class: "two" }, both.map((m, i) => h("div", {}, h("div", { class: "row small" }, nameOf(m), h("span", { class: "room" }), arrays[i] ? csvButton(`map-${m.number}`, () => heats[i].columns(isStrain(arrays[i]) ? 0 : 0.5)) : null), arrays[i] ? heats[i].element : h("p", { class: "quiet" }, "It has not been compared yet: continue from it once.")))),
       h("h3", {}, "Each run, rms over the noise"), h("table", {}, h("tbody", {}, parts(told).map(([name, [x, y]]) => h("tr", {}, h("td", {}, name), h("td", { class: "n" }, number(x)), h("td", { class: "n" }, number(y)), h("td", { class: y < x ? "good" : "warn" }, change(x, y)))))));
     arrays.forEach((data, i) => data && heats[i].show(mapOf(data, limit)));
   };

@@ -13,8 +13,17 @@ export function h(kind, attributes = {}, ...children) {
   return made;
 }
 
+const markOf = (one) => [one.localName, one.id, one.getAttribute("aria-label"), one.getAttribute("href"), one.textContent].join();
+
+// What has the focus keeps it, and what was typed, when the same is drawn anew: nobody at the keyboard is thrown back to the top.
 export function fill(place, ...children) {
+  const old = place.contains(document.activeElement) && document.activeElement !== place ? document.activeElement : null, mark = old && markOf(old);
   place.replaceChildren(...children.flat(3).filter((one) => one !== null && one !== undefined && one !== false));
+  const same = old && [...place.querySelectorAll(old.localName)].find((one) => markOf(one) === mark);
+  if (same) {
+    if (old.localName === "input" && old.type === "text") same.value = old.value;
+    same.focus({ preventScroll: true });
+  }
   return place;
 }
 

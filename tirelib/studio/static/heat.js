@@ -1,4 +1,4 @@
-// A heat map on a canvas: rows of numbers over an axis; a cell is chosen by click or by the arrow keys.
+// A heat map on a canvas: rows of numbers over an axis; a cell is chosen by click or by the arrow keys, a range by dragging or by Shift with them.
 import { fill, h, number, tall } from "./dom.js";
 
 const BLUE_RED = [[33, 102, 172], [146, 197, 222], null, [244, 165, 130], [178, 24, 43]];
@@ -49,6 +49,12 @@ export class Heat {
     this.at.row = Math.min(this.at.row, Math.max(0, map.rows.length - 1));
     this.at.column = Math.min(this.at.column, map.columns - 1);
     this.draw();
+  }
+
+  // The map as columns of a table: the rows' names, then one for each place across, which is that far into its cell.
+  columns(into) {
+    const { rows, columns, x } = this.map;
+    return [["row", rows.map((row) => row.label)], ...Array.from({ length: columns }, (_, k) => [number(x.low + ((k + into) * (x.high - x.low)) / columns, 5), rows.map((row) => row.values[k])])];
   }
 
   paint() {
@@ -146,7 +152,15 @@ export class Heat {
     if (!step || !this.map?.rows.length) return;
     event.preventDefault();
     this.at.row = Math.max(0, Math.min(this.map.rows.length - 1, this.at.row + step[0]));
-    this.at.column = Math.max(0, Math.min(this.map.columns - 1, this.at.column + step[1]));
-    this.say(this.at); this.choose(this.at); this.draw();
+    const from = this.at.column;
+    this.at.column = Math.max(0, Math.min(this.map.columns - 1, from + step[1]));
+    this.say(this.at);
+    if (event.shiftKey && step[1] && this.brush) {
+      if (!this.range) this.from = from;
+      const edge = (column) => this.map.x.low + (column * (this.map.x.high - this.map.x.low)) / this.map.columns;
+      this.range = [edge(Math.min(this.from, this.at.column)), edge(Math.max(this.from, this.at.column) + 1)];
+      this.brush(this.range);
+    } else this.choose(this.at);
+    this.draw();
   }
 }

@@ -12,7 +12,7 @@ const VALUES = { difference: "model less measured", white: "whitened residual" }
 export class Field {
   constructor({ height = 400, onRow = null } = {}) {
     this.by = "load"; this.value = "difference"; this.row = 0; this.range = null; this.trace = null; this.onRow = onRow;
-    this.heat = new Heat("Map of the residual; arrow keys choose a run", { height, choose: (at) => { this.row = at.row; this.detail(); }, brush: (range) => { this.range = range; this.detail(); this.stats(); } });
+    this.heat = new Heat("Map of the residual; arrow keys choose a run, with Shift a range", { height, choose: (at) => { this.row = at.row; this.detail(); }, brush: (range) => { this.range = range; this.detail(); this.stats(); } });
     this.controls = h("div", { class: "row" });
     this.said = h("p", { class: "small", role: "status" });
     this.element = h("div", { class: "card" }, this.controls, this.heat.element, this.said);
@@ -63,7 +63,7 @@ export class Field {
       choose(this.orders(data), this.by, (by) => { this.by = by; this.build(); this.detail(); }, "rows by"),
       choose(Object.entries(VALUES).filter(([k]) => k !== "white" || known), this.value, (v) => { this.value = v; this.build(); this.detail(); }, "values"),
       choose([["diverging", "blue and red"], ["cividis", "dark to light"]], this.heat.colors, (c) => { this.heat.colors = c; this.heat.image = null; this.heat.draw(); }, "colours"),
-      csvButton("map", () => [["row", this.rows.map((r) => r.label)], ...Array.from({ length: this.columns }, (_, k) => [number(this.x.low + ((k + (strain ? 0 : 0.5)) * (this.x.high - this.x.low)) / this.columns, 5), this.rows.map((r) => r.values[k])])]));
+      csvButton("map", () => this.heat.columns(strain ? 0 : 0.5)));
     this.stats();
   }
 
@@ -74,7 +74,7 @@ export class Field {
 
   stats() {
     const { data, range } = this;
-    if (!range) { this.said.textContent = "Drag over the map or the plot to see what share of the squared residual a range holds."; return; }
+    if (!range) { this.said.textContent = `${isStrain(data) ? "The thin lines are the edges of the model's contact. " : ""}Drag over the map or the plot (at the keyboard: Shift with the arrow keys) to see what share of the squared residual a range holds.`; return; }
     const at = (k) => this.x.low + ((k + 0.5) * (this.x.high - this.x.low)) / this.columns;
     const found = share(data, this.value, this.rows, (k) => at(k) >= range[0] && at(k) <= range[1], data.counted);
     this.said.textContent = `From ${number(range[0])} to ${number(range[1])}: rms ${number(found.rms)} ${this.unit}, ${number(100 * found.share, 3)} % of the squares, ${found.count} values.`;
@@ -113,7 +113,7 @@ export class See {
       h("div", { class: "figures" }, h("div", {}, h("span", { class: "quiet" }, "error of the model"), h("b", { id: "error" }, number(c.error, 4)), h("span", { class: "quiet" }, unitName(c.error_unit))),
         h("div", {}, h("span", { class: "quiet" }, "not explained, rms"), h("b", {}, number(c.residual_rms, 3)), h("span", { class: "quiet" }, `of ${number(c.measured_rms, 3)} ${unitName(c.unit)}`)),
         c.noise ? h("div", {}, h("span", { class: "quiet" }, "noise of the repeats"), h("b", {}, number(c.noise, 3)), h("span", { class: "quiet" }, unitName(c.unit))) : null,
-        h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, c.verdict.replaceAll("_", " ")), h("span", { class: "quiet" }, c.verdict === "fits" ? "the rest is noise" : VERDICTS[model.verdict] || "more than noise is left"))),
+        h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, VERDICTS[model.verdict] || (c.verdict === "fits" ? "the model fits" : "not known yet")), h("span", { class: "quiet" }, c.verdict === "fits" ? "what is left is noise" : "what is left is more than noise"))),
       h("span", { class: "room" }), h("button", { class: "main", type: "button", onclick: () => this.go("suspect") }, "Find what is missing")),
     said.length ? h("details", {}, h("summary", {}, `Where it fails, in words (${said.length})`), h("ul", {}, said.map((s) => h("li", {}, s)))) : null);
     this.plots();
