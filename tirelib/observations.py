@@ -204,13 +204,13 @@ def same_tire(headers: Sequence[CampaignHeader]) -> None:
         if other.tire.name != first.tire.name:
             raise CalibrationError(
                 f"{other.name}: tire {other.tire.name!r} is not {first.tire.name!r} of "
-                f"{first.name}; a calibration holds for one tire; calibrate them apart"
+                f"{first.name}; a calibration holds for one tire; calibrate them separately"
             )
         for name, given, known in differing(geometry_of(other), geometry_of(first)):
             raise CalibrationError(
                 f"{other.name}: {name} of the tire is {1e3 * given:g} mm, of that of {first.name} "
-                f"{1e3 * known:g} mm; a calibration holds for one tire; calibrate them apart, or "
-                "mend campaign.toml"
+                f"{1e3 * known:g} mm; a calibration holds for one tire; calibrate them separately, "
+                "or mend campaign.toml"
             )
         if not same_layout(other.gage_lateral, first.gage_lateral):
             raise CalibrationError(

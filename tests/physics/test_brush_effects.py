@@ -208,6 +208,15 @@ def test_warmth_and_sliding_speed_lower_what_they_should() -> None:
     np.testing.assert_allclose(fast_mu / 0.95, (slow_mu / 0.95) ** 2, rtol=1e-12)
 
 
+def test_friction_falls_alike_whether_the_tread_slides_along_or_across() -> None:
+    slip, none = np.abs(POINTS.slip_ratio), 0.0 * POINTS.load
+    law = CATALOGUE["friction_speed"].at(0.5)[1]
+    along = law(state(replace(POINTS, slip_ratio=slip, slip_angle=none))).mu
+    across = law(state(replace(POINTS, slip_ratio=none, slip_angle=np.arctan(slip)))).mu
+    np.testing.assert_allclose(along, across, rtol=1e-12)
+    np.testing.assert_allclose(along, 0.95 * np.exp(-0.05 * np.abs(POINTS.speed) * slip))
+
+
 def test_camber_is_worth_its_share_of_slip_angle() -> None:
     small = replace(POINTS, slip_angle=0.0 * POINTS.load, slip_ratio=0.0 * POINTS.load)
     turned = replace(small, slip_angle=0.2 * small.camber, camber=0.0 * small.camber)
@@ -242,6 +251,14 @@ def test_a_softer_carcass_lowers_the_side_force() -> None:
     at = replace(POINTS, slip_ratio=0.0 * POINTS.load)
     soft = forces(CATALOGUE["carcass"].at(0.01), at=at)[1]
     assert (np.abs(soft) <= np.abs(forces(at=at)[1]) + 1e-9).all()
+
+
+def test_a_soft_carcass_turns_the_contact_by_so_many_degrees_for_each_newton_metre() -> None:
+    at = replace(POINTS, slip_ratio=0.0 * POINTS.load)
+    soft = forces(CATALOGUE["carcass"].at(0.01), at=at)
+    turned = replace(at, slip_angle=at.slip_angle - np.deg2rad(0.01 * soft[2]))
+    # the brush counts the turn in tan(alpha), which differs by alpha^2, 2 % of so small a turn
+    np.testing.assert_allclose(soft[:2], forces(at=turned)[:2], rtol=1e-3, atol=1e-2)
 
 
 def test_the_rings_pressure_is_as_strong_as_the_ring_says() -> None:

@@ -80,6 +80,6 @@ def needs_ring(campaign: Campaign, file: TireFile) -> None:
             f"{', '.join(FORCES)}, or identify the ring from straight runs with `tirelib identify`"
         )
     raise CalibrationError(
-        f"{file.name}: it states no complete ring, so it says nothing of the strain of {name}: "
+        f"{file.name}: it states no complete ring, so it says nothing about the strain of {name}: "
         f"{lacks}; identify the tire from straight runs with `tirelib identify`, or add them"
     )

@@ -421,6 +421,7 @@ def _messages(
     if not slips(points.data, name):
         slip = "slip ratio" if name == "Fx" else "slip angle"
         out.append(
-            f"{where} holds one {slip} only: {name} says nothing of the brush. Add runs with slip."
+            f"{where} holds one {slip} only: {name} says nothing about the brush. "
+            "Add runs with slip."
         )
     return tuple(out)

@@ -44,7 +44,7 @@ def faults(document: Mapping[str, Any]) -> Iterator[str]:
     yield from _numbers(document, "rolling", ("centre", "threshold"))
     lateral = document.get("lateral_m")
     if not isinstance(lateral, list) or len(lateral) < 3 or not all(map(_finite, lateral)):
-        yield f"lateral_m = {lateral!r}; a list of three numbers at least is needed"
+        yield f"lateral_m = {lateral!r}; a list of at least three numbers is needed"
         return
     chains = document.get("chain")
     if not isinstance(chains, list) or not chains:

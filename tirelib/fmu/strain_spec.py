@@ -232,7 +232,7 @@ start or a gap is never valid.</li> <li>Without an estimate a Real output shows 
 estimate.</li> <li>Forward rolling on a flat road; a turn shorter than 3 s.</li> <li>The slip ratio
 needs <code>speed</code>; a calibration with pressure or camber needs those.</li> <li>Without
 contacts for two turns <code>valid</code> drops and the last values are held.</li> </ul>"""
-_PATHS = """<li>The path of the unpacked FMU may hold spaces, but no percent-encoded character
-else.</li> </ul>"""
+_PATHS = """<li>The path of the unpacked FMU may hold spaces, but no other character that a URI
+encodes with a percent sign.</li> </ul>"""
 _CHECK = """<p><code>resources/reference</code> holds input and expected output in the FMI
 cross-check layout; <code>tirelib fmu check X.fmu</code> plays and compares them.</p>"""

@@ -92,8 +92,8 @@ def brush_of(file: TireFile) -> BrushModel:
     missing = [STORED[name] for name in NEEDED if STORED[name] not in file.numbers]
     if missing:
         raise CalibrationError(
-            f"model {file.name} states no {' and no '.join(missing)}: it says nothing of forces; "
-            "identify it from a campaign with slip, or give [brush.bristle_lateral] and "
+            f"model {file.name} states no {' and no '.join(missing)}: it says nothing about "
+            "forces; identify it from a campaign with slip, or give [brush.bristle_lateral] and "
             "[tread.friction]"
         )
     values: dict[str, float] = {}

@@ -174,7 +174,7 @@ def _remarks(fit: BrushFit, estimates: tuple[Estimate, ...], data: ForceData) ->
             "rigid carcass explains. Forces do not depend on it; do not read it as a contact length"
         )
     if not np.isfinite(data.pressure).any():
-        out.append("the inflation pressure is unknown: the brush holds at the one of the test")
+        out.append("the inflation pressure is unknown: the brush holds at the pressure of the test")
     return out
 
 

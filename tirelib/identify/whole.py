@@ -110,7 +110,7 @@ def _start(campaign: Campaign, start: TireFile | None, reasons: list[str]) -> Ti
     if start.missing:
         reasons.append(
             f"{start.name}: the given tire states no complete ring ({', '.join(start.missing[:3])} "
-            "... missing): it is no start, literature values are"
+            "... missing): literature values are the start instead"
         )
         return None
     given, measured = start.numbers["free_radius"].value, campaign.header.tire.free_radius

@@ -22,7 +22,7 @@ from tirelib.quantities import QUANTITIES
 FORMAT = "tirelib-next-test/1"
 PROMISING = 0.5
 """Chance of ruling a suspect out below which a run is not advised without a warning."""
-NONE = "nothing is in doubt: no effects that this campaign leaves apart to be told"
+NONE = "nothing is in doubt: this campaign leaves no effects that have to be told apart"
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,13 +333,13 @@ def _advised(plan: Plan, test: NextTest) -> str:
     between = " and ".join(name.replace(NOTHING, "no effect") for name in pair.names)
     if chance < PROMISING:
         text = (
-            f"no run in the envelope is likely to part {between}: the best, {where}, does with a "
-            f"chance of {100 * chance:.0f} %"
+            f"no run in the envelope is likely to separate {between}: the best, {where}, does with "
+            f"a chance of {100 * chance:.0f} %"
         )
     else:
         text = (
-            f"measure {where}: it parts {between} with a chance of {100 * chance:.0f} % (any run "
-            f"of the envelope: {100 * float(test.probability.mean()):.0f} %)"
+            f"measure {where}: it separates {between} with a chance of {100 * chance:.0f} % (any "
+            f"run of the envelope: {100 * float(test.probability.mean()):.0f} %)"
         )
     needed = pair.needed(plan.wanted)
     if needed is None and pair.limit < plan.wanted:

@@ -203,7 +203,7 @@ def _campaigns(points: Any, name: str) -> Range:
     if name == "speed" and not (np.isfinite(values) & (values > 0.0)).all():
         raise ParameterError(
             "envelope: the campaign does not tell its speed in every run, so no run at another "
-            "can be foretold; give speed_kmh in runs.csv"
+            "speed can be predicted; give speed_kmh in runs.csv"
         )
     if not np.isfinite(values).all() or (axis.positive and not (values > 0.0).all()):
         raise ParameterError(

@@ -157,7 +157,7 @@ def _nearest(name: str, catalogue: Mapping[str, Effect]) -> str:
 def _known(name: str, catalogue: Mapping[str, Effect]) -> Effect:
     if name not in catalogue:
         raise ParameterError(
-            f"the diagnosis tells of {name!r}, which is not known; load the file that defines it "
+            f"the diagnosis names {name!r}, which is not known; load the file that defines it "
             "with --effects, or diagnose again"
         )
     return catalogue[name]

@@ -130,10 +130,10 @@ def _by_p(told: Mapping[str, Any]) -> str:
     it = "it" if len(told["sets"] and told["sets"][0]) == 1 else "them"
     if told["verdict"] not in ("unknown", "form_inadequate"):
         return (
-            f"Without {it} the model is rejected (p = {without}); with {it} nothing stands out of "
-            f"what plain tires show (p = {p})."
+            f"Without {it} the model is rejected (p = {without}); with {it} nothing stands out "
+            f"from what plain tires show (p = {p})."
         )
-    stands = f"{_stands(told['misfit_of'])} stands out of what plain tires show."
+    stands = f"{_stands(told['misfit_of'])} stands out from what plain tires show."
     if told["verdict"] == "unknown":
         return (
             f"Every hypothesis that was tried is rejected (p = {p} of the likeliest, "

@@ -55,7 +55,7 @@ def to_plain(value: Any) -> Any:
     if is_dataclass(value) and name in _classes():
         return {name: [to_plain(getattr(value, field.name)) for field in fields(value)]}
     raise FormatError(
-        f"state: {type(value).__name__} cannot be saved; teach tirelib.stream about it"
+        f"state: {type(value).__name__} cannot be saved; add its type to tirelib.stream.snapshot"
     )
 
 

@@ -150,7 +150,7 @@ KINDS: Mapping[str, Kind] = {
         ("planted.npz",),
     ),
     "next-test": Kind(
-        "find the run that would tell the suspects apart",
+        "find the run that would separate the suspects",
         lambda o, out: [
             *("next-test", o["campaign"], "--model", o["model"], *_about(o)),
             *("--diagnosis", o["diagnosis"]),

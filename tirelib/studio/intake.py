@@ -126,7 +126,9 @@ def unpack(archive: Path, target: Path) -> None:
                     while block := source.read(1 << 20):
                         left -= len(block)
                         if left < 0:
-                            raise FormatError(f"{archive.name}: it holds more than it says")
+                            raise FormatError(
+                                f"{archive.name}: it unpacks to more bytes than its index states"
+                            )
                         sink.write(block)
     except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError) as error:
         raise FormatError(

@@ -196,6 +196,12 @@ def test_water_takes_load_off_the_tread_with_speed_squared_and_from_its_front() 
     shift = (state.contact.edges - base.contact.edges)[FREE_ROLLING]
     assert (shift[:, 0] > 0).all()
     assert (shift[:, 0] > -shift[:, 1]).all()
+    # half a contact long, and parabolic: the first harmonic is lower by half the variance
+    assert state.contact.extra is not None
+    whole, first = state.contact.extra[:, 0, 0].real, state.contact.extra[:, 1, 0]
+    quarter = 0.25 * np.diff(base.contact.edges, axis=1)[:, 0]
+    variance = 2.0 * (1.0 - 0.5 * np.abs(first) / np.abs(whole))
+    np.testing.assert_allclose(variance, quarter**2 / 5.0, rtol=0.02)
     # springs below the axle carry what the road and the water bring
     assert state.contact.extra is not None
     water = -np.pi * TIRE.ring_radius * state.contact.extra[:, 1, 0].real

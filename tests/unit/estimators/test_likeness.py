@@ -117,7 +117,7 @@ def test_a_tire_of_other_dimensions_is_refused(trained: Trained) -> None:
         calibration.check_layout("made-up tire", LATERAL, "here", {"free_radius": 1.05 * radius})
     first = header()
     wider = replace(first, tire=replace(first.tire, free_radius=1.05 * first.tire.free_radius))
-    with pytest.raises(CalibrationError, match="calibrate them apart, or mend"):
+    with pytest.raises(CalibrationError, match="calibrate them separately, or mend"):
         same_tire([first, wider])
 
 

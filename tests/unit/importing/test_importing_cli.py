@@ -109,7 +109,7 @@ def test_list_and_suggest_need_no_map(tmp_path: Path) -> None:
 def test_a_listing_takes_the_layout_from_a_map(tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     file.write_text("a;b|c\n1;2|3\n4;5|6\n7;8|9\n")
-    assert "it reads alike" in str(call(file, "--list").exception)
+    assert "it reads equally well" in str(call(file, "--list").exception)
     layout = write_map(tmp_path, '[csv]\nseparator = "|"\n')
     listed = call(file, "--list", "--map", layout)
     assert listed.exit_code == 0

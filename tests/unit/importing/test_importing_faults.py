@@ -354,5 +354,5 @@ def test_a_set_point_that_changes_within_a_run_is_named(refused: Refused, tmp_pa
 def test_a_file_named_twice_and_a_copy_are_named(refused: Refused, tmp_path: Path) -> None:
     file = write_csv(tmp_path / "a.csv", sae_columns())
     copy = write_csv(tmp_path / "b.csv", sae_columns())
-    says(refused(file, file), "a.csv: named twice")
+    says(refused(file, file), "a.csv: it is named twice")
     says(refused(file, copy), "b.csv: duplicate run: its samples are those of", "a.csv")

@@ -150,8 +150,8 @@ def test_units_are_taken_from_their_line_or_from_brackets(tmp_path: Path) -> Non
         ("1,2\n3,4\n5,6\n", "no line with 2 names"),
         ("a,b\n", "1 line(s) with text"),
         ("once upon\na time\nthere was\n", "no table of numbers"),
-        ("a;b|c\n1;2|3\n4;5|6\n7;8|9\n", "it reads alike with separator ';'"),
-        ("a;b\n1.234,5;2\n2.234,5;3\n", "it reads alike with separator ';'"),
+        ("a;b|c\n1;2|3\n4;5|6\n7;8|9\n", "it reads equally well with separator ';'"),
+        ("a;b\n1.234,5;2\n2.234,5;3\n", "it reads equally well with separator ';'"),
     ],
 )
 def test_a_layout_that_cannot_be_told_is_refused(text: str, said: str, tmp_path: Path) -> None:

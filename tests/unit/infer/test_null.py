@@ -58,6 +58,16 @@ def test_a_family_unlike_the_others_raises_the_limit() -> None:
     assert np.median(unlike.plain[2]) > np.median(unlike.plain[0])
 
 
+def test_a_familys_tires_are_judged_by_the_others_and_never_by_their_own() -> None:
+    """What a family alone shows, its own tires would excuse: a user's tire is of no family."""
+    own = family(40, 3, "wide")
+    scale = np.where(np.arange(own.draws.shape[1]) == 0, 20.0, 1.0)
+    square = np.where(np.arange(own.squares.shape[1]) == 0, 400.0, 1.0)
+    wide = replace(own, draws=scale * own.draws, squares=square * own.squares)
+    usual, unusual = plain((FAMILIES[0], wide)).plain
+    assert np.median(unusual) > 3.0 * np.quantile(usual, 0.9)
+
+
 def test_the_limit_is_where_the_p_value_falls_to_the_level() -> None:
     found = plain(FAMILIES)
     limit = found.limit(0.05)

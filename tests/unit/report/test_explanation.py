@@ -65,7 +65,7 @@ def test_what_is_named_is_told_with_its_size_its_fall_and_the_command_that_adds_
     told = explained(diagnosis(), "M.toml", "DIR")
     assert told.missing == "damping (what damping does), strength 0.0812 \u00b1 0.001."
     assert told.sure == (
-        "Without it the model is rejected (p = 0.0004); with it nothing stands out of what plain "
+        "Without it the model is rejected (p = 0.0004); with it nothing stands out from what plain "
         "tires show (p = 0.41). No other effect of the catalogue explains these measurements as "
         "well."
     )

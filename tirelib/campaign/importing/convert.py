@@ -224,7 +224,7 @@ class _Conversion:
         self.check_lengths(varying, count, rule.column)
         if count < 2:
             self.fault(
-                "rows", "", f"{count} row(s) of data", "two are needed at least", "export it again"
+                "rows", "", f"{count} row(s) of data", "at least two are needed", "export it again"
             )
         if column is None:
             return np.asarray(np.arange(count) / rule.rate, np.float64)

@@ -160,7 +160,7 @@ def _layout(file: str, lines: Sequence[str], options: CsvOptions) -> _Layout:
     given = (
         "no table of numbers is found"
         if not best
-        else f"it reads alike with {' or with '.join(map(str, by_separator.values()))}"
+        else f"it reads equally well with {' or with '.join(map(str, by_separator.values()))}"
     )
     raise refusal(
         file,

@@ -120,7 +120,7 @@ class _Import:
         self, files: Sequence[Path], map_file: str | Path, progress: Progress | None
     ) -> None:
         if not files:
-            raise ParameterError("no file is given; one at least is needed; name the files")
+            raise ParameterError("no file is given; at least one is needed; name the files")
         self.files = files
         self.progress = progress
         self.notes: list[str] = []
@@ -137,7 +137,7 @@ class _Import:
         missing = False  # runs are missing, so that problems of the plan may be wrong
         for place, file in enumerate(self.files):
             if file in self.files[:place]:
-                faults.append(f"{file}: named twice; each file once; drop one")
+                faults.append(f"{file}: it is named twice; each file is read once; drop one")
                 continue
             try:
                 pieces, findings = self.read(place)
@@ -159,7 +159,7 @@ class _Import:
         faults += [str(problem) for problem in problems]
         if not faults and not imported:
             faults = [
-                f"{self.rules.file}: every run is skipped; one at least is needed; take a "
+                f"{self.rules.file}: every run is skipped; at least one is needed; take a "
                 "skip out of [runs]"
             ]
         if faults:

@@ -143,7 +143,8 @@ def _case(name: str, model: ForceModel, points: ForcePoints, quantity: str) -> F
     if not slips(points.data, quantity):
         slip = "slip ratio" if quantity == "Fx" else "slip angle"
         raise CalibrationError(
-            f"{name}: one {slip} only, so {quantity} tells nothing of the brush; add runs with slip"
+            f"{name}: one {slip} only, so {quantity} says nothing about the brush; "
+            "add runs with slip"
         )
     messages = []
     whole = points

@@ -20,8 +20,8 @@ from tirelib.report.style import BLACK, BLUE, CATEGORIES, FAINT, RED
 _HOW = {
     "contact length": "From the steepest rise of strain at the entry to the steepest fall at the "
     "exit, read from measurement and model in the same way",
-    "deflection": "Free radius less loaded radius; the measured one holds the rig's zero, which is "
-    "not corrected",
+    "deflection": "Free radius less loaded radius; the measured one includes the rig's zero, which "
+    "is not corrected",
     "contact entry": "Wheel angle of the steepest rise of strain, read from measurement and model "
     "in the same way; above zero on the right, the model's contact begins too late",
     "contact exit": "Wheel angle of the steepest fall of strain, read from measurement and model "
