@@ -267,18 +267,20 @@ def columns_of(
         If an array has another number of samples than the strain.
     """
     rows: FloatArray = np.require(strain, np.float64, "A")
-    kept = [rows]
-    columns = (Column * (len(rows) + len(order) + 1))()
-    begin, (apart, step) = rows.ctypes.data, rows.strides
-    for gage in range(len(rows)):
-        columns[gage].first, columns[gage].step = begin + gage * apart, step // 8
-    others = [*(held.get(name, np.nan) for name in order), np.nan if trigger is None else trigger]
-    for number, value in enumerate(others, start=len(rows)):
-        line: FloatArray = np.require(value, np.float64, ("C", "A")).reshape(-1)
+    known = [*(held.get(name, np.nan) for name in order), np.nan if trigger is None else trigger]
+    kept, (apart, step) = [rows], rows.strides
+    placed = [(_address(rows) + gage * apart, step // 8) for gage in range(len(rows))]
+    for number, value in enumerate(known):
+        line: FloatArray = np.ascontiguousarray(value, np.float64)
+        if not line.flags.aligned:
+            line = line.copy()
         if np.ndim(value) and line.shape != rows.shape[1:]:
-            name = order[number - len(rows)] if number < len(rows) + len(order) else "trigger"
+            name = order[number] if number < len(order) else "trigger"
             raise ShapeError(f"{name} has shape {line.shape}; {rows.shape[1:]} is needed")
         kept.append(line)
-        columns[number].first = line.ctypes.data
-        columns[number].step = 1 if np.ndim(value) else 0
-    return columns, kept
+        placed.append((_address(line), np.ndim(value)))
+    return (Column * len(placed)).from_buffer(np.array(placed, np.int64).data), kept
+
+
+def _address(array: FloatArray) -> int:
+    return int(array.__array_interface__["data"][0])

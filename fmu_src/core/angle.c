@@ -1,6 +1,6 @@
 #include "angle.h"
 
-enum { NEWTON = 8 };
+enum { NEWTON = 8, AT_ONCE = 32 };
 
 static const double LARGEST_RATIO = 2.0, ENDS = 17.0 / 240.0; /* ENDS: squared */
 
@@ -13,6 +13,18 @@ static double polynomial(const double *c, int64_t terms, double x) {
 
 double law_at(const AngleLaw *law, double sample) {
     return polynomial(law->angle, law->terms, (sample - law->middle) / law->turn);
+}
+
+void law_angles(const AngleLaw *law, double first, size_t n, double *angle) {
+    for (size_t i = 0; i < n; i += AT_ONCE) {
+        double x[AT_ONCE], begin = first + (double)i;
+        int many = n - i < AT_ONCE ? (int)(n - i) : AT_ONCE;
+        for (int j = 0; j < many; j++) x[j] = (begin + (double)j - law->middle) / law->turn;
+        for (int j = 0; j < many; j++) angle[i + (size_t)j] = law->angle[law->terms - 1];
+        for (int64_t k = law->terms - 2; k >= 0; k--) /* as `polynomial` does it for one */
+            for (int j = 0; j < many; j++)
+                angle[i + (size_t)j] = law->angle[k] + angle[i + (size_t)j] * x[j];
+    }
 }
 
 double law_sample(const AngleLaw *law, double phi) {

@@ -24,12 +24,13 @@ typedef struct {
 } AngleLaw;
 
 /* Return the law of one turn; the courses are of the measured turn rate and of the speed.
- * Reference: angle_law; test: test_native_angle. */
+ * Reference: angle_law; test: test_native_turns. */
 AngleLaw angle_law(double middle, double turn, double ahead, const Course *omega,
                    const Course *speed, const Past *past, double unknown);
 
-/* Wheel angle [rad] at a sample number, and back. Reference: AngleLaw.at, AngleLaw.sample. */
+/* Wheel angle [rad] at a sample number, at n samples from one on, and back. Reference: AngleLaw.at, AngleLaw.sample. */
 double law_at(const AngleLaw *law, double sample);
+void law_angles(const AngleLaw *law, double first, size_t n, double *angle);
 double law_sample(const AngleLaw *law, double phi);
 
 /* Reference: minmod. */

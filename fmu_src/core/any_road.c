@@ -16,12 +16,12 @@ static double surprise_of(double apart, double std) {
 
 /* Reference: _moments */
 static double moments(const double *x, const double *weight, double *variance) {
-    double sum = 0.0, mean = 0.0;
+    double sum = 0.0, mean = 0.0, square = 0.0;
     for (int i = 0; i < POINTS; i++) sum += weight[i];
-    for (int i = 0; i < POINTS; i++) mean += weight[i] / sum * x[i];
-    *variance = 0.0;
-    for (int i = 0; i < POINTS; i++)
-        *variance += weight[i] / sum * ((x[i] - mean) * (x[i] - mean));
+    for (int i = 0; i < POINTS; i++) mean += weight[i] * x[i];
+    mean /= sum;
+    for (int i = 0; i < POINTS; i++) square += weight[i] * ((x[i] - mean) * (x[i] - mean));
+    *variance = square / sum;
     return mean;
 }
 
@@ -38,7 +38,7 @@ static void possible(const Calibration *cal, const SlidingCurve *c, const Seen *
         double t = low + 0.5 * (high - low) * (cal->node[i] + 1.0);
         double filled = maximum(1.0 - pow(1.0 - t, n), k->tiny);
         p->t[i] = t;
-        p->slip[i] = curve_across(c, k, used, t, s->load);
+        p->slip[i] = used / cornering * (t > 0.0 ? n * t / filled : 1.0); /* curve_across */
         p->weight[i] =
             n * used / (cornering * (filled * filled)) * 0.5 * (high - low) * cal->weight[i];
     }

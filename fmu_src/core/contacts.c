@@ -5,6 +5,13 @@ static const double SMALLEST_SWING = 5e-4;
 
 double contact_middle(const Contact *contact) { return 0.5 * (contact->rise + contact->fall); }
 
+/* Decide how long the finder waits for a contact. */
+static void find_patience(ContactFinder *f) {
+    f->patience = f->longest_turn;
+    if (f->periods && (int64_t)(PATIENCE * f->last_period) < f->patience)
+        f->patience = (int64_t)(PATIENCE * f->last_period);
+}
+
 /* ContactFinder._restart */
 static void restart(ContactFinder *f) {
     f->levels = f->pulse = f->middles = f->periods = 0;
@@ -13,6 +20,7 @@ static void restart(ContactFinder *f) {
     f->lowest = INFINITY;
     f->highest = -INFINITY;
     f->since = f->count;
+    find_patience(f);
 }
 
 void finder_start(ContactFinder *f, int64_t longest_turn, int centre) {
@@ -36,10 +44,7 @@ static double median_of_three(double a, double b, double c) {
 
 /* ContactFinder._room */
 static int64_t room(const ContactFinder *f) {
-    int64_t patience = f->longest_turn;
-    if (f->periods && (int64_t)(PATIENCE * f->last_period) < patience)
-        patience = (int64_t)(PATIENCE * f->last_period);
-    int64_t left = f->since + patience - f->count;
+    int64_t left = f->since + f->patience - f->count;
     return left > 1 ? left : 1;
 }
 
@@ -48,7 +53,7 @@ static int extreme_hidden(const ContactFinder *f, const Ring *ring) {
     int64_t first = (int64_t)floor(f->last_rise) + 1, base = ring_base(ring);
     double reach = GAP_REACH * f->last_period;
     for (int64_t i = first > base ? first : base; i < f->count; i++) {
-        if (isfinite(ring_row(ring, i)[f->centre])) continue;
+        if (isfinite(ring_at(ring, f->centre, i))) continue;
         if (!f->periods) return 1;
         if ((double)i < (double)f->since + reach || (double)i > (double)f->pulse_start - reach)
             return 1;
@@ -58,13 +63,13 @@ static int extreme_hidden(const ContactFinder *f, const Ring *ring) {
 
 /* ContactFinder._finish */
 static int finished(ContactFinder *f, const Ring *ring, double last, Contact *found) {
-    int start_up = !f->levels, fresh = start_up || !f->middles, column = ring_search(ring);
+    int start_up = !f->levels, fresh = start_up || !f->middles;
     double swing = f->highest - f->lowest, own_level = f->lowest + RISE * swing;
     double level = start_up ? own_level : f->level;
     int64_t size = f->count - f->pulse_start, i = 0, j = 0;
     f->pulse = 0;
     for (int64_t k = 0, any = 0; k < size; k++)
-        if (ring_row(ring, f->pulse_start + k)[column] > level) {
+        if (*ring_seen(ring, f->pulse_start + k) > level) {
             if (!any) i = k;
             any = 1;
             j = k;
@@ -82,10 +87,10 @@ static int finished(ContactFinder *f, const Ring *ring, double last, Contact *fo
     }
     f->armed = 0; /* the new levels may lie below the strain just reached */
     f->lowest = f->highest = last;
-    double before = ring_row(ring, f->pulse_start + i - 1)[column];
-    double at_rise = ring_row(ring, f->pulse_start + i)[column];
-    double at_fall = ring_row(ring, f->pulse_start + j)[column];
-    double after = ring_row(ring, f->pulse_start + j + 1)[column];
+    double before = *ring_seen(ring, f->pulse_start + i - 1);
+    double at_rise = *ring_seen(ring, f->pulse_start + i);
+    double at_fall = *ring_seen(ring, f->pulse_start + j);
+    double after = *ring_seen(ring, f->pulse_start + j + 1);
     double rise = (double)(i - 1) + (level - before) / (at_rise - before);
     double fall = (double)j + (at_fall - level) / (at_fall - after);
     double shift = (double)(f->pulse_start + 1); /* the median of three lags by one sample */
@@ -100,6 +105,7 @@ static int finished(ContactFinder *f, const Ring *ring, double last, Contact *fo
     f->last_period = middle - f->last_middle;
     f->last_middle = middle;
     f->middles = 1;
+    find_patience(f);
     return 1;
 }
 
@@ -109,6 +115,7 @@ static void look_for_jump(ContactFinder *f, double y) {
     if (!f->levels || high - low <= JUMP * f->swing) return;
     f->levels = f->middles = f->periods = 0;
     f->armed = 1;
+    find_patience(f);
 }
 
 /* ContactFinder._advance, of one sample */
@@ -149,7 +156,7 @@ static int advance(ContactFinder *f, const Ring *ring, double y, Contact *found)
 }
 
 int finder_take(ContactFinder *f, const Ring *ring, Contact *found) {
-    double x = ring_row(ring, ring->total - 1)[f->centre], y = NAN;
+    double x = ring_at(ring, f->centre, ring->total - 1), y = NAN;
     if (isfinite(x)) f->held = x; /* ContactFinder._without_gaps */
     x = f->held;
     int whole = f->seen == 2;
@@ -161,6 +168,6 @@ int finder_take(ContactFinder *f, const Ring *ring, Contact *found) {
         f->seen++;
         return 0;
     }
-    ring_row(ring, f->count)[ring_search(ring)] = y;
+    *ring_seen(ring, f->count) = y;
     return advance(f, ring, y, found);
 }

@@ -22,7 +22,7 @@ typedef struct {
     int seen;                    /* how many of the tail there are */
     int levels, armed, pulse;    /* levels: not start-up; pulse: within one */
     double level, low_level, swing, lowest, highest;
-    int64_t pulse_start, since;
+    int64_t pulse_start, since, patience;
     int middles, periods; /* whether the last middle, the last period are known */
     double last_middle, last_period, last_rise;
 } ContactFinder;
@@ -30,7 +30,7 @@ typedef struct {
 void finder_start(ContactFinder *finder, int64_t longest_turn, int centre);
 
 /* Look at the newest sample of the ring; return 1 if a contact ended. Reference:
- * ContactFinder.push; test: test_native_contacts. */
+ * ContactFinder.push; test: test_native_turns. */
 int finder_take(ContactFinder *finder, const Ring *ring, Contact *found);
 
 double contact_middle(const Contact *contact);

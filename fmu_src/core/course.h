@@ -16,7 +16,7 @@ typedef struct {
 } Course;
 
 /* Return how a source runs from one contact to beyond the next.
- * Reference: course; test: test_native_course. */
+ * Reference: course; test: test_native_turns. */
 Course course(const double *samples, size_t n, double first, double turn);
 
 #endif

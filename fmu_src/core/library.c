@@ -33,6 +33,7 @@ Cutter *tirelib_cutter_start(void *memory, int gages, const double *lateral, dou
 int64_t tirelib_cut(Cutter *cutter, const Column *columns, int64_t n, int64_t *taken, Turn *turns,
                     int64_t most) {
     int64_t count = 0;
+    cutter->ring.record = columns;
     while (count < most) {
         int found = cutter_run(cutter, columns, n, taken, turns + count);
         if (found < 0) return -1;
@@ -45,6 +46,7 @@ int64_t tirelib_cut(Cutter *cutter, const Column *columns, int64_t n, int64_t *t
 int64_t tirelib_cut_features(Cutter *cutter, const Column *columns, int64_t n, int64_t *taken,
                              Turn *turn, TurnHead *heads, Features *features, int64_t most) {
     int64_t count = 0;
+    cutter->ring.record = columns;
     while (count < most) {
         int found = cutter_run(cutter, columns, n, taken, turn);
         if (found < 0) return -1;

@@ -27,8 +27,9 @@ CORE_EXPORT size_t tirelib_cutter_size(int gages, double rate);
 CORE_EXPORT Cutter *tirelib_cutter_start(void *memory, int gages, const double *lateral,
                                          double rate, const LowPass *low_pass);
 
-/* Cut samples of a record, from `*taken` to before n, until `most` turns are complete. A column for
- * each gage, each held condition and the trigger. Returns how many turns there are, fewer than
+/* Cut the samples of a record, from `*taken` to before n, until `most` turns are complete. A column
+ * for each gage, each held condition and the trigger, which begin with the cutter's first sample and
+ * stay as they are until the last call. Returns how many turns there are, fewer than
  * `most` when all samples are taken, or -1 where the reference raises an error.
  * Reference: TurnCutter.push; test: test_compiled. */
 CORE_EXPORT int64_t tirelib_cut(Cutter *cutter, const Column *columns, int64_t n, int64_t *taken,

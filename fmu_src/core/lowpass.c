@@ -68,13 +68,16 @@ static void weigh_samples(const Filter *filter, double phi, size_t start, size_t
     }
 }
 
-/* Sums of weighted samples, and of them times their distance from a wheel angle. */
-static void add_samples(const double *rows, size_t lanes, const double *weight, const double *angle,
-                        double phi, size_t n, double *plain, double *moment) {
-    double sum[LANES] = {0.0}, moved[LANES] = {0.0};
+/* Sums of weighted samples, and of them times their distance from a wheel angle; returns the sum of
+ * the weights times the square of that distance. */
+static double add_samples(const double *rows, size_t lanes, const double *weight,
+                          const double *angle, double phi, size_t n, double *plain,
+                          double *moment) {
+    double sum[LANES] = {0.0}, moved[LANES] = {0.0}, second = 0.0;
     for (size_t i = 0; i < n; i++) {
         const double *sample = rows + i * lanes;
-        double share = weight[i], arm = share * (angle[i] - phi);
+        double distance = angle[i] - phi, share = weight[i], arm = share * distance;
+        second += arm * distance;
         for (int g = 0; g < LANES; g++) {
             sum[g] += sample[g] * share;
             moved[g] += sample[g] * arm;
@@ -84,6 +87,7 @@ static void add_samples(const double *rows, size_t lanes, const double *weight, 
         plain[g] = sum[g];
         moment[g] = moved[g];
     }
+    return second;
 }
 
 void filter_rows(const Filter *filter, const double *samples, size_t stride, int gages,
@@ -92,7 +96,6 @@ void filter_rows(const Filter *filter, const double *samples, size_t stride, int
     for (size_t i = 0; i < filter->n; i++, rows += lanes) {
         for (size_t g = 0; g < lanes; g++) rows[g] = g < one ? samples[g * stride + i] : 0.0;
         rows[one] = 1.0;
-        rows[one + 1] = filter->angle[i];
     }
 }
 
@@ -105,11 +108,11 @@ void filter_turn(const Filter *filter, const double *rows, int gages, double *st
         size_t start = nearest(filter, phi, &place) - filter->reach;
         weigh_samples(filter, phi, start, known, start + size, weight, growth);
         known = start + size;
+        double second = 0.0;
         for (size_t g = 0; g < lanes; g += LANES)
-            add_samples(rows + start * lanes + g, lanes, weight + start, filter->angle + start, phi,
-                        size, plain + g, moment + g);
+            second = add_samples(rows + start * lanes + g, lanes, weight + start,
+                                 filter->angle + start, phi, size, plain + g, moment + g);
         double total = plain[gages], first = moment[gages];
-        double second = moment[gages + 1] - phi * first;
         double mean = first / total; /* of the distance: the weights are not quite symmetric */
         for (int g = 0; g < gages; g++) {
             double slope = (moment[g] - mean * plain[g]) / (second - mean * first);

@@ -19,9 +19,9 @@ int lowpass_suits(const LowPass *low_pass, double turn_rate, double rate);
 /* Reference: half_width */
 double lowpass_half_width(double sigma);
 
-/* Numbers that are summed at once; a row of samples has a multiple of them: the gages, a one, and the
- * sample's wheel angle, so that the sums of the weights and of their moments come along. */
-enum { LANES = 8, MOST_LANES = (GAGES + 2 + LANES - 1) / LANES * LANES };
+/* Numbers that are summed at once; a row of samples has a multiple of them: the gages, and a one, so
+ * that the sums of the weights come along. */
+enum { LANES = 6, MOST_LANES = (GAGES + 1 + LANES - 1) / LANES * LANES };
 
 /* The samples of a turn, and how many of them the filter looks at for one wheel angle. */
 typedef struct {
@@ -32,7 +32,9 @@ typedef struct {
 } Filter;
 
 /* Return how many doubles a row of samples has. */
-static inline size_t filter_lanes(int gages) { return (size_t)((gages + 2 + LANES - 1) / LANES * LANES); }
+static inline size_t filter_lanes(int gages) {
+    return (size_t)((gages + 1 + LANES - 1) / LANES * LANES);
+}
 
 /* Prepare the filter for samples at given, growing angles; `scratch` holds n doubles.
  * Returns 0 if it would reach beyond the samples for one of the first `angles` of the grid. */

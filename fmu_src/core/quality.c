@@ -16,9 +16,11 @@ static size_t longest_run(const unsigned char *mask, size_t n) {
     return longest;
 }
 
-/* How long the samples stand still at a value at the longest. */
-static size_t longest_stand(const double *x, size_t n, double value) {
-    size_t run = 0, longest = 0;
+/* How long the samples stand still at a value at the longest; 0 where fewer than `needed` have it. */
+static size_t longest_stand(const double *x, size_t n, double value, double needed) {
+    size_t run = 0, longest = 0, there = 0;
+    for (size_t i = 0; i < n; i++) there += x[i] == value;
+    if ((double)there < needed) return 0;
     for (size_t i = 0; i < n; i++) {
         run = x[i] == value ? run + 1 : 0;
         if (run > longest) longest = run;
@@ -39,6 +41,13 @@ static int has_corner(const double *x, size_t n, double extreme, double jump, do
 }
 
 static double bend(const double *x, size_t i) { return fabs(x[i + 1] - 2.0 * x[i] + x[i - 1]); }
+
+/* Whether one of the samples bends more than `most`. */
+static int bent_more(const double *x, size_t n, double most) {
+    size_t many = 0;
+    for (size_t i = 1; i + 1 < n; i++) many += bend(x, i) > most;
+    return many > 0;
+}
 
 /* Median of a sample's four neighbours; NaN if one of them is. */
 static double around(const double *x, size_t i) {
@@ -64,18 +73,34 @@ static void bridge(double *x, const unsigned char *missing, size_t n) {
     for (size_t k = known == n ? 0 : known + 1; k < n; k++) x[k] = known == n ? 0.0 : x[known];
 }
 
+/* Lowest and highest of the samples that are there, four at a time. */
+static void limits(const double *x, size_t n, double *low, double *high) {
+    double lows[4], highs[4];
+    size_t i = 0;
+    for (int k = 0; k < 4; k++) lows[k] = INFINITY, highs[k] = -INFINITY;
+    for (; i + 4 <= n; i += 4)
+        for (int k = 0; k < 4; k++) {
+            double y = x[i + (size_t)k];
+            lows[k] = y < lows[k] ? y : lows[k];
+            highs[k] = y > highs[k] ? y : highs[k];
+        }
+    for (; i < n; i++) {
+        lows[0] = x[i] < lows[0] ? x[i] : lows[0];
+        highs[0] = x[i] > highs[0] ? x[i] : highs[0];
+    }
+    *low = fmin(fmin(lows[0], lows[1]), fmin(lows[2], lows[3]));
+    *high = fmax(fmax(highs[0], highs[1]), fmax(highs[2], highs[3]));
+}
+
 /* Swing of the samples that are there, and whether they stand still at its ends. */
 static double swing_of(const double *x, size_t n, double step, int *flags) {
-    double low = INFINITY, high = -INFINITY;
-    for (size_t i = 0; i < n; i++) {
-        if (x[i] < low) low = x[i];
-        if (x[i] > high) high = x[i];
-    }
+    double low, high;
+    limits(x, n, &low, &high);
     double swing = low > high ? 0.0 : high - low, angle = floor(FLAT_ANGLE / step);
     double needed = angle > FLAT_SAMPLES ? angle : FLAT_SAMPLES;
     for (int end = 0; end < 2 && swing > 0.0; end++) {
         double extreme = end ? low : high;
-        if ((double)longest_stand(x, n, extreme) >= needed &&
+        if ((double)longest_stand(x, n, extreme, needed) >= needed &&
             has_corner(x, n, extreme, CORNER_SHARE * swing, step))
             *flags |= SATURATED;
     }
@@ -97,22 +122,21 @@ void inspect(double *window, size_t stride, size_t n, int gages, double step, in
     if (share < SPIKE_SHARE) share = SPIKE_SHARE;
     for (int g = 0; g < gages; g++) {
         double *x = window + (size_t)g * stride;
-        int lost = 0;
-        for (size_t i = 0; i < n; i++) {
+        size_t lost = 0;
+        for (size_t i = 0; i < n; i++) lost += !isfinite(x[i]);
+        for (size_t i = 0; i < n && lost; i++) {
             missing[i] = (unsigned char)!isfinite(x[i]);
-            if (missing[i]) x[i] = NAN, lost = 1;
+            if (missing[i]) x[i] = NAN;
         }
         flags[g] = !lost ? 0 : longest_run(missing, n) > LONGEST_BRIDGE ? GAP : BRIDGED;
         swing[g] = swing_of(x, n, step, &flags[g]);
-        for (size_t i = 1; i + 1 < n && !bent; i++) bent = bend(x, i) > share * swing[g];
+        bent = bent || bent_more(x, n, share * swing[g]);
     }
     for (int g = 0; g < gages; g++) {
         double *x = window + (size_t)g * stride;
-        int lost = 0;
-        for (size_t i = 0; i < n; i++) {
-            missing[i] = (unsigned char)(isnan(x[i]) != 0);
-            lost |= missing[i];
-        }
+        int lost = (flags[g] & (GAP | BRIDGED)) != 0;
+        if (!lost && !bent) continue;
+        for (size_t i = 0; i < n; i++) missing[i] = (unsigned char)(isnan(x[i]) != 0);
         if (bent && n >= 5 && spikes(x, n, share * swing[g], missing)) {
             flags[g] |= SPIKE | BRIDGED;
             lost = 1;

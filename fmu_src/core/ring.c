@@ -1,21 +1,26 @@
 #include "ring.h"
 
+#include <string.h>
+
 size_t ring_size(int gages, int64_t capacity) {
     return (size_t)(gages + HELD + 2) * (size_t)capacity;
 }
 
 void ring_start(Ring *ring, double *memory, int gages, int64_t capacity) {
+    ring->width = gages + HELD + 1;
     ring->rows = memory;
+    ring->seen = memory + ring->width * capacity;
+    ring->record = NULL;
     ring->capacity = capacity;
     ring->total = ring->place = 0;
     ring->gages = gages;
-    ring->width = gages + HELD + 2;
 }
 
 void ring_take(Ring *ring, const Column *columns, int64_t at) {
     double *row = ring->rows + ring->place * ring->width;
-    for (int i = 0; i < ring->width - 1; i++) row[i] = columns[i].first[at * columns[i].step];
-    row[ring->width - 1] = NAN;
+    for (int i = 0; i < ring->width && !ring->record; i++)
+        row[i] = columns[i].first[at * columns[i].step];
+    ring->seen[ring->place] = NAN;
     ring->total++;
     if (++ring->place == ring->capacity) ring->place = 0;
 }
@@ -26,16 +31,26 @@ int64_t ring_base(const Ring *ring) {
 
 int ring_held(const Ring *ring, int condition) { return ring->gages + condition; }
 int ring_trigger(const Ring *ring) { return ring->gages + HELD; }
-int ring_search(const Ring *ring) { return ring->gages + HELD + 1; }
+
+/* Copy n samples that lie `step` doubles apart. */
+static void copy(double *to, const double *from, int64_t step, size_t n) {
+    if (step == 1)
+        memcpy(to, from, n * sizeof *to);
+    else
+        for (size_t i = 0; i < n; i++) to[i] = from[(int64_t)i * step];
+}
 
 size_t ring_column(const Ring *ring, int column, int64_t start, int64_t stop, double *out) {
-    size_t n = 0;
-    const double *end = ring->rows + ring->capacity * ring->width;
-    const double *row = start < stop ? ring_row(ring, start) : end;
-    for (int64_t i = start; i < stop; i++) {
-        out[n++] = row[column];
-        row += ring->width;
-        if (row == end) row = ring->rows;
+    if (start >= stop) return 0;
+    size_t n = (size_t)(stop - start);
+    if (ring->record) {
+        const Column *given = ring->record + column;
+        copy(out, given->first + start * given->step, given->step, n);
+        return n;
     }
+    int64_t place = ring_place(ring, start);
+    size_t left = (size_t)(ring->capacity - place), first = n < left ? n : left;
+    copy(out, ring->rows + place * ring->width + column, ring->width, first);
+    copy(out + first, ring->rows + column, ring->width, n - first);
     return n;
 }

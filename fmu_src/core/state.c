@@ -49,7 +49,7 @@ static Head head_of(const Wheel *w) {
 }
 
 static size_t size_of(const Head *h, int width) {
-    size_t numbers = (size_t)h->rows * (size_t)width * sizeof(double);
+    size_t numbers = (size_t)h->rows * (size_t)(width + 1) * sizeof(double);
     return sizeof *h + sizeof(Live) + sizeof(Cutter) + (size_t)h->queued * sizeof(Contact) +
            numbers + sizeof(uint64_t);
 }
@@ -69,9 +69,14 @@ static void get(void *to, const unsigned char **from, size_t n) {
     *from += n;
 }
 
+static double *row_of(const Ring *ring, int64_t sample) {
+    return ring->rows + ring_place(ring, sample) * ring->width;
+}
+
 /* Keep the places in a cutter's own memory. */
 static void keep_places(Cutter *to, const Cutter *own) {
     to->ring.rows = own->ring.rows;
+    to->ring.seen = own->ring.seen;
     to->waiting = own->waiting;
     to->window = own->window;
     to->rows = own->rows;
@@ -94,8 +99,10 @@ void state_save(const Wheel *w, unsigned char *bytes) {
     put(&at, &plain, sizeof plain);
     for (int64_t i = 0; i < c->queued; i++)
         put(&at, &c->waiting[(c->next + i) % c->places], sizeof(Contact));
-    for (int64_t i = 0; i < h.rows; i++)
-        put(&at, ring_row(&c->ring, h.first + i), (size_t)c->ring.width * sizeof(double));
+    for (int64_t i = h.first; i < c->ring.total; i++) {
+        put(&at, row_of(&c->ring, i), (size_t)c->ring.width * sizeof(double));
+        put(&at, ring_seen(&c->ring, i), sizeof(double));
+    }
     uint64_t sum = state_hash(bytes, (size_t)(at - bytes));
     put(&at, &sum, sizeof sum);
 }
@@ -119,7 +126,9 @@ int state_restore(Wheel *w, const unsigned char *bytes, size_t n) {
     get(c, &at, sizeof *c);
     keep_places(c, &kept);
     get(c->waiting, &at, (size_t)h.queued * sizeof(Contact));
-    for (int64_t i = 0; i < h.rows; i++)
-        get(ring_row(&c->ring, h.first + i), &at, (size_t)c->ring.width * sizeof(double));
+    for (int64_t i = 0; i < h.rows; i++) {
+        get(row_of(&c->ring, h.first + i), &at, (size_t)c->ring.width * sizeof(double));
+        get(ring_seen(&c->ring, h.first + i), &at, sizeof(double));
+    }
     return 1;
 }

@@ -113,7 +113,7 @@ static void find_law(Cutter *c, const Contact *contact, const Contact *before) {
 /* Whether samples of the centre gage are missing from one sample to before another. */
 static int gap_in(const Cutter *c, int64_t first, int64_t stop) {
     for (int64_t i = kept_from(c, first); i < stop && i < c->ring.total; i++)
-        if (!isfinite(ring_row(&c->ring, i)[c->centre])) return 1;
+        if (!isfinite(ring_at(&c->ring, c->centre, i))) return 1;
     return 0;
 }
 
@@ -123,20 +123,37 @@ static int damaged(const Cutter *c, const Contact *contact) {
     return gap_in(c, rise - NEAR_EDGE, rise + 2) || gap_in(c, fall - NEAR_EDGE, fall + 2);
 }
 
+/* Leave out what is missing; return how many numbers are left. */
+static size_t only_finite(double *x, size_t n) {
+    size_t count = 0, missing = 0;
+    for (size_t i = 0; i < n; i++) missing += !isfinite(x[i]);
+    if (!missing) return n;
+    for (size_t i = 0; i < n; i++)
+        if (isfinite(x[i])) x[count++] = x[i];
+    return count;
+}
+
+/* Four sums at once, which do not wait for each other. */
+static double sum_of(const double *x, size_t n) {
+    double sum[4] = {0.0};
+    size_t i = 0;
+    for (; i + 4 <= n; i += 4)
+        for (int k = 0; k < 4; k++) sum[k] += x[i + (size_t)k];
+    for (; i < n; i++) sum[0] += x[i];
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
 /* Mean or median of a column between two sample numbers; `gap` where too much is missing.
  * Reference: TurnCutter._mean */
 static double mean_of(const Cutter *c, int column, double start, double stop, int robust,
                       int *gap) {
     int64_t a = kept_from(c, whole(rint(start))), b = whole(rint(stop));
     if (b > c->ring.total) b = c->ring.total;
-    size_t n = ring_column(&c->ring, column, a, b, c->scratch), count = 0;
-    double sum = 0.0;
-    for (size_t i = 0; i < n; i++)
-        if (isfinite(c->scratch[i])) sum += c->scratch[count++] = c->scratch[i];
+    size_t n = ring_column(&c->ring, column, a, b, c->scratch), count = only_finite(c->scratch, n);
     double needed = (1.0 - LARGEST_MISSING) * (double)n;
     *gap = (double)count < (needed > 1.0 ? needed : 1.0);
     if (*gap) return NAN;
-    return robust ? median(c->scratch, count) : sum / (double)count;
+    return robust ? median(c->scratch, count) : sum_of(c->scratch, count) / (double)count;
 }
 
 static double held_mean(const Cutter *c, int condition, double start, double stop) {
@@ -154,7 +171,7 @@ static int window_of(Cutter *c, Turn *turn, double sigma) {
     for (int g = 0; g < c->gages; g++)
         ring_column(&c->ring, g, first, c->stop, c->window + (size_t)g * stride);
     inspect(c->window, stride, n, c->gages, c->law.step, turn->gage_flags, c->missing);
-    for (size_t i = 0; i < n; i++) c->angle[i] = law_at(&c->law, (double)(first + (int64_t)i));
+    law_angles(&c->law, (double)first, n, c->angle);
     if (!filter_start(&filter, c->angle, n, sigma, seen, c->scratch)) return 0;
     filter_rows(&filter, c->window, stride, c->gages, c->rows);
     filter_turn(&filter, c->rows, c->gages, turn->strain, turn->rate, c->scratch);
@@ -199,9 +216,9 @@ static void look_at_trigger(const Cutter *c, double start, double stop, Turn *tu
     int column = ring_trigger(&c->ring), times = 0;
     turn->axis_shift = NAN;
     for (int64_t i = a; i < b; i++) {
-        double on = ring_row(&c->ring, i)[column];
+        double on = ring_at(&c->ring, column, i);
         if (isnan(on)) return;
-        if (i > a && on > 0.5 && ring_row(&c->ring, i - 1)[column] <= 0.5) times++, top = i;
+        if (i > a && on > 0.5 && ring_at(&c->ring, column, i - 1) <= 0.5) times++, top = i;
     }
     if (a >= b) return;
     if (times == 1)

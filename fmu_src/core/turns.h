@@ -67,8 +67,8 @@ Cutter *cutter_start(void *memory, int gages, const double *lateral, double rate
                      const LowPass *low_pass);
 
 /* Take sample `at` of columns: gages, held conditions, trigger (NaN: there is none). Then ask
- * cutter_next until it returns 0. Returns 0 if more contacts wait than a queue can hold, which no wheel brings about.
- * Reference: TurnCutter.push; test: test_native_turns. */
+ * cutter_next until it returns 0. Returns 0 if more contacts wait than a queue can hold, which no
+ * wheel brings about. Reference: TurnCutter.push; test: test_native_turns. */
 int cutter_take(Cutter *cutter, const Column *columns, int64_t at);
 
 /* Give the next turn that is complete: 1, none: 0, or -1 where the reference raises an error: the

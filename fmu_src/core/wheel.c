@@ -74,7 +74,7 @@ static int samples_in(const Wheel *w, double step, int count) {
     return length ? (int)whole : STEP_LENGTH;
 }
 
-/* Whether a gage without contact stands still. Reference: StreamEstimator._gage_out */
+/* Whether a gage without contact stands still. Reference: NumpyEstimator._gage_out */
 static int stands_still(const Cutter *c, int gage) {
     const ContactFinder *f = &c->finder;
     int64_t first = f->middles ? (int64_t)f->last_middle - 1
@@ -87,7 +87,7 @@ static int stands_still(const Cutter *c, int gage) {
         if (before < first) first = before;
     }
     for (int64_t i = first > base ? first : base; i < c->ring.total; i++) {
-        double x = ring_row(&c->ring, i)[gage];
+        double x = ring_at(&c->ring, gage, i);
         if (!isfinite(x)) return 1;
         low = fmin(low, x);
         high = fmax(high, x);
@@ -104,7 +104,7 @@ static int gage_out(const Wheel *w) {
     return 0;
 }
 
-/* Reference: StreamEstimator._estimate */
+/* Reference: NumpyEstimator._estimate */
 static void take_turn(Wheel *w) {
     Live *l = &w->live;
     const Turn *turn = w->turn;
@@ -120,7 +120,7 @@ static void take_turn(Wheel *w) {
     l->held = 0;
 }
 
-/* Reference: StreamEstimator.stale */
+/* Reference: NumpyEstimator.stale */
 static int stale(const Wheel *w) {
     const Live *l = &w->live;
     if ((double)l->count + l->idle * w->rate > l->deadline) return 1;

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs/reference/native_functions.md"
 FUNCTION = re.compile(r"^(?:[a-zA-Z_]\w*[ *]+)+(\w+)\([^;{}]*?\)\s*\{", re.MULTILINE)
 """A definition: it begins its line, and braces follow."""
-ROOTS = ("numpy", "scipy", "int", "min")
+ROOTS = ("numpy", "scipy", "tirelib", "int", "min")
 
 
 class Row(NamedTuple):
