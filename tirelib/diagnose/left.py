@@ -95,13 +95,21 @@ def left_of(error: ModelError, points: Operating, beyond: FloatArray | None = No
     powers = _powers(points, np.sqrt(squares.mean(axis=1)))
     return Left(
         white,
-        f"{_PLACES[first]} ({100 * shares[first]:.0f} % of the squares), most of it from "
-        f"{np.rad2deg(start):.0f} to {np.rad2deg(stop):.0f} deg",
+        f"{_PLACES[first]} ({100 * shares[first]:.0f} % of the squares), most of it "
+        f"{told_range(start, stop)}",
         told_powers(powers),
         (start, stop),
         shares,
         powers,
         edges,
+    )
+
+
+def told_range(start: float, stop: float) -> str:
+    """Say a range of the wheel angle [rad] in -180 to 180 deg, as plots have it."""
+    low, high = np.rad2deg(start), np.rad2deg(stop)
+    return f"from {low:.0f} " + (
+        f"to {high:.0f} deg" if high <= 180.0 else f"through 180 to {high - 360.0:.0f} deg"
     )
 
 

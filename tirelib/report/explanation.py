@@ -302,6 +302,8 @@ def _floor(told: Mapping[str, Any], after: float) -> str:
     if not _known(floor):
         return ""
     if _said(floor) == _said(after):
+        if told.get("verdict") in ("unknown", "form_inadequate"):
+            return " Noise and the structure of a tire can be as large, but not of this shape."
         return " All of that is noise and the structure of a tire."
     return f" Of that, noise and the structure of a tire explain {_said(floor)}."
 

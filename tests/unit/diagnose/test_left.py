@@ -17,7 +17,7 @@ from tirelib.diagnose.document import next_test
 from tirelib.diagnose.fitted import Fitted, fitted
 from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.held_out import folds, held_out, pooled
-from tirelib.diagnose.left import left_of
+from tirelib.diagnose.left import left_of, told_range
 from tirelib.effects import CATALOGUE
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.select import Hypotheses
@@ -174,3 +174,8 @@ def test_the_next_test_parts_two_that_look_alike_by_what_only_one_varies_with() 
 )
 def test_every_verdict_has_a_next_step(verdict: str, names: tuple[str, ...], says: str) -> None:
     assert says in next_test(_told(verdict, *names))["what"]
+
+
+def test_a_range_through_the_seam_of_the_turn_is_told_in_the_angles_of_the_plots() -> None:
+    assert told_range(*np.deg2rad([-6.0, 7.0])) == "from -6 to 7 deg"
+    assert told_range(*np.deg2rad([154.0, 296.0])) == "from 154 through 180 to -64 deg"

@@ -203,3 +203,7 @@ def test_without_a_name_one_error_is_told() -> None:
         "anew. All of that is noise and the structure of a tire."
     )
     assert "No further run" in told.next
+    odd = explained(diagnosis(verdict="unknown", named=[], error_after=23.5, floor=23.5, p=0.03))
+    assert odd.error.endswith(
+        "Noise and the structure of a tire can be as large, but not of this shape."
+    )

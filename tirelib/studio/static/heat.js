@@ -89,6 +89,8 @@ export class Heat {
     const w = width - LEFT - RIGHT, t = height - TOP - BOTTOM, n = map.rows.length;
     this.box = { w, t };
     g.imageSmoothingEnabled = false;
+    g.fillStyle = style("--line");  // where there is no value
+    g.fillRect(LEFT, TOP, w, t);
     g.drawImage(this.image, LEFT, TOP, w, t);
     g.fillStyle = g.strokeStyle = style("--quiet");
     const up = (row) => TOP + t - ((row + 0.5) * t) / n;

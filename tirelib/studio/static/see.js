@@ -74,7 +74,7 @@ export class Field {
 
   stats() {
     const { data, range } = this;
-    if (!range) { this.said.textContent = `${isStrain(data) ? "The thin lines are the edges of the model's contact. " : ""}Drag over the map or the plot (at the keyboard: Shift with the arrow keys) to see what share of the squared residual a range holds.`; return; }
+    if (!range) { this.said.textContent = `${isStrain(data) ? "The thin lines are the edges of the model's contact. " : "Where the map is grey, nothing was measured. "}Drag over the map or the plot (at the keyboard: Shift with the arrow keys) to see what share of the squared residual a range holds.`; return; }
     const at = (k) => this.x.low + ((k + 0.5) * (this.x.high - this.x.low)) / this.columns;
     const found = share(data, this.value, this.rows, (k) => at(k) >= range[0] && at(k) <= range[1], data.counted);
     this.said.textContent = `From ${number(range[0])} to ${number(range[1])}: rms ${number(found.rms)} ${this.unit}, ${number(100 * found.share, 3)} % of the squares, ${found.count} values.`;
