@@ -1,0 +1,86 @@
+"""Several threads of a C program, each with an instance of its own, get what one alone gets."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import native_fmu
+import numpy as np
+import pytest
+from fmpy import extract, read_model_description
+
+from tests.fmu import live
+from tests.native.core import SOURCE
+from tests.synthetic import LATERAL
+from tirelib.held import HELD
+
+HOST = Path(__file__).with_name("threads.c")
+THREADS, SAMPLES = 4, 10
+RACES = ("-g", "-O1", "-fsanitize=thread")
+
+
+def compiled(out: Path, *flags: str) -> Path:
+    """Compile the sources of the FMU, and the host that loads them, with the same flags."""
+    rooms = [SOURCE, *(SOURCE.parent / room for room in ("tire", "slave", "fmi2", "fmi3"))]
+    sources = sorted(source for room in rooms for source in room.glob("*.c"))
+    common = ["gcc", *native_fmu.C99, *native_fmu.STRICT, *flags]
+    library = [*sources, "-shared", "-fPIC", "-lm", "-o", out.with_suffix(".so")]
+    subprocess.run([*common, *library], check=True)
+    host = ["gcc", "-std=c99", *flags, HOST, "-ldl", "-pthread", "-o", out]
+    subprocess.run(host, check=True)
+    return out
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Samples of a wheel, and the host."""
+    if shutil.which("gcc") is None or sys.platform != "linux":
+        pytest.skip("no gcc on this machine, or it is not Linux")
+    out = tmp_path_factory.mktemp("threads")
+    compiled(out / "plain", "-O1")
+    strain = live.strain_of(4e3, 0.05, turns=4.4)[0]
+    n = strain.shape[1] // SAMPLES
+    known = {"speed": live.SPEED, "pressure": live.PRESSURE, "camber": 0.0}
+    held = np.tile([known.get(name, np.nan) for name in HELD], (n, 1))
+    np.hstack((strain[:, : n * SAMPLES].T.reshape(n, -1), held)).tofile(out / "frames")
+    return out
+
+
+@pytest.fixture(scope="module")
+def fmu(folder: Path) -> Path:
+    """An unpacked FMU of the estimator."""
+    return Path(extract(str(live.fmu_file(SAMPLES)), unzipdir=str(folder / "fmu")))
+
+
+def run(host: Path, library: Path, fmu: Path, threads: int) -> list[np.ndarray]:
+    """Return what each thread got, shape (2 n steps, 8)."""
+    guid = read_model_description(str(fmu), validate=False).guid
+    width, out = len(LATERAL) * SAMPLES + len(HELD), host.parent / f"{library.stem}{threads}-"
+    arguments = [library, guid, (fmu / "resources").as_uri(), host.parent / "frames", str(width)]
+    command = [host, *arguments, repr(SAMPLES / live.RATE), out, str(threads)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    return [np.fromfile(f"{out}{number}").reshape(-1, 8) for number in range(threads)]
+
+
+def test_threads_get_what_one_alone_gets(folder: Path, fmu: Path) -> None:
+    library = fmu / "binaries" / "linux64" / "StrainTire.so"
+    (alone,) = run(folder / "plain", library, fmu, 1)
+    first, second = np.split(alone, 2)
+    np.testing.assert_array_equal(first, second)
+    assert np.isfinite(first[-1]).any()
+    for one in run(folder / "plain", library, fmu, THREADS):
+        np.testing.assert_array_equal(one, alone)
+
+
+def test_the_thread_sanitizer_sees_no_race(folder: Path, fmu: Path) -> None:
+    empty = folder / "empty.c"
+    empty.write_text("int main(void) { return 0; }\n")
+    command = ["gcc", *RACES, empty, "-o", empty.with_suffix("")]
+    if subprocess.run(command, check=False, capture_output=True).returncode:
+        pytest.skip("the thread sanitizer is not installed")
+    compiled(folder / "races", *RACES)
+    (alone,) = run(folder / "plain", folder / "plain.so", fmu, 1)
+    for one in run(folder / "races", folder / "races.so", fmu, THREADS):
+        np.testing.assert_array_equal(one, alone)
