@@ -274,6 +274,14 @@ def test_a_gage_is_dead_below_a_quarter_of_the_others_steepness(share: float, de
         assert has(turns, TurnFlag.DEAD_GAGE, 3, 4) == dead
 
 
+@pytest.mark.parametrize(("share", "spike"), [(0.04, False), (0.06, True)])
+def test_a_sample_is_a_spike_from_a_twentieth_of_the_swing_on(share: float, spike: bool) -> None:
+    window = np.cos(0.001 * np.arange(-3000, 3000))[None] * 1e-3
+    window[0, 2000] += share * np.ptp(window)
+    _, flags = inspect(window, 0.001)
+    assert bool(flags[0] & int(TurnFlag.SPIKE)) == spike
+
+
 @pytest.mark.parametrize(("angle", "saturated"), [(0.036, False), (0.044, True)])
 def test_a_gage_that_stands_at_its_extreme_is_saturated_from_four_hundredths_of_a_radian(
     angle: float, saturated: bool
