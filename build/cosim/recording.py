@@ -54,8 +54,10 @@ class Recording:
     static: FloatArray
 
 
-def build_fmus(folder: Path, calibration: Path, step: float = STEP) -> tuple[Path, Path]:
-    """Write both FMUs for steps [s]; return the virtual tire and the strain tire."""
+def build_fmus(
+    folder: Path, calibration: Path, step: float = STEP, *, python: bool = False
+) -> tuple[Path, Path]:
+    """Write both FMUs for steps [s], compiled or Python's; return virtual and strain tire."""
     samples = round(step * RATE)
     folder.mkdir(parents=True, exist_ok=True)
     return (
@@ -64,9 +66,14 @@ def build_fmus(folder: Path, calibration: Path, step: float = STEP) -> tuple[Pat
             samples_per_step=samples,
             sample_rate=RATE,
             surface=friction_surface(),
+            python=python,
         ),
         build_fmu(
-            calibration, folder / "StrainTire.fmu", samples_per_step=samples, sample_rate=RATE
+            calibration,
+            folder / "StrainTire.fmu",
+            samples_per_step=samples,
+            sample_rate=RATE,
+            python=python,
         ),
     )
 

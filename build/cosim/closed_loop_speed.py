@@ -1,0 +1,97 @@
+"""Closed loops with Python's FMUs and with compiled ones: the same figures, and how much faster.
+
+    python build/cosim/closed_loop_speed.py hydroplaning antilock_low
+
+Each loop is one of ``make cosim``; it runs twice, in this process, whose CPU time is told. All that
+it finds is compared: numbers relative to the larger of the two, words exactly.
+"""
+
+import argparse
+import dataclasses
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from cosim import closed_loop
+from cosim.calibrate import CALIBRATION
+from cosim.recording import build_fmus
+from cosim.run import LOOPS, work
+from tirelib.threads import one_thread
+
+
+def leaves(found: Any, place: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield all numbers and words of what a loop found, and where they stand."""
+    if dataclasses.is_dataclass(found):
+        found = {f.name: getattr(found, f.name) for f in dataclasses.fields(found)}
+    if isinstance(found, dict):
+        for name, part in found.items():
+            yield from leaves(part, f"{place}.{name}")
+    elif isinstance(found, list | tuple):
+        for number, part in enumerate(found):
+            yield from leaves(part, f"{place}[{number}]")
+    else:
+        yield place, found
+
+
+def apart(one: Any, other: Any) -> tuple[int, float, str]:
+    """Return how many numbers there are, how far apart they are at most, and where.
+
+    Raises
+    ------
+    SystemExit
+        If a word differs, or something is there only once.
+    """
+    count, most, where = 0, 0.0, ""
+    for (place, a), (again, b) in zip(leaves(one), leaves(other), strict=True):
+        x, y = np.asarray(a), np.asarray(b)
+        if x.dtype.kind != "f":
+            if place != again or not np.array_equal(x, y):
+                raise SystemExit(f"{place}: {a} is not {b}")
+            continue
+        if x.shape != y.shape or not np.array_equal(np.isfinite(x), np.isfinite(y)):
+            raise SystemExit(f"{place}: {a} is not {b}")
+        known = np.isfinite(x)
+        size = np.maximum(np.abs(x[known]), np.abs(y[known])).max(initial=0.0)
+        off = np.abs(x[known] - y[known]).max(initial=0.0) / size if size else 0.0
+        count += x.size
+        if off > most:
+            most, where = float(off), place
+    return count, most, where
+
+
+def main() -> None:
+    """Build both kinds, run each loop with both, print."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("loops", nargs="+", choices=LOOPS)
+    given = options.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        kinds = {
+            python: build_fmus(folder / str(python), CALIBRATION, closed_loop.STEP, python=python)
+            for python in (False, True)
+        }
+        for loop in given.loops:
+            found, spent = {}, {}
+            for python, fmus in kinds.items():
+                begin = time.process_time()
+                found[python] = work(loop, fmus)
+                spent[python] = time.process_time() - begin
+            count, most, where = apart(found[False], found[True])
+            sys.stdout.write(
+                f"{loop}: CPU {spent[False]:.1f} s compiled, {spent[True]:.1f} s Python, "
+                f"{spent[True] / spent[False]:.1f} times; {count} numbers, at most {most:.1e} "
+                f"apart{' in ' + where if where else ''}\n"
+            )
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    with one_thread():
+        main()
