@@ -11,12 +11,13 @@ each that has ended. Its input stays open while the server lives; when it ends, 
 import json
 import os
 import runpy
+import select
 import signal
 import subprocess
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from importlib import import_module
 from typing import Any, NoReturn
@@ -59,14 +60,12 @@ def main(run: Run = tirelib, loaded: Sequence[str] = LOADED) -> None:
     if COPIES:
         for name in loaded:
             import_module(name)
-        signal.signal(signal.SIGCHLD, lambda *_: starter.look())
-    with open(0, "rb", closefd=False) as orders:
-        for line in orders:
-            order = json.loads(line)
-            if "start" in order:
-                starter.start(order)
-            else:
-                starter.end(order["end"])
+    for line in starter.orders() if COPIES else sys.stdin.buffer:
+        order = json.loads(line)
+        if "start" in order:
+            starter.start(order)
+        else:
+            starter.end(order["end"])
     starter.close()
 
 
@@ -76,6 +75,24 @@ class _Starter:
         self._jobs: dict[int, int] = {}  # number by process
         self._life = os.pipe()  # its other end closes when this process is gone
         self._saying = threading.Lock()
+
+    def orders(self) -> Iterator[bytes]:
+        """Yield the lines of the standard input; between them, see which jobs have ended."""
+        ended, wake = os.pipe()
+        os.set_blocking(wake, False)
+        signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
+        signal.signal(signal.SIGCHLD, lambda *_: None)  # so that the pipe is told of it
+        rest = b""
+        while True:
+            ready, _, _ = select.select([0, ended], [], [])
+            if ended in ready:
+                os.read(ended, 1 << 12)
+                self._look()
+            if 0 in ready:
+                if not (part := os.read(0, 1 << 16)):
+                    return
+                *lines, rest = (rest + part).split(b"\n")
+                yield from lines
 
     def start(self, order: dict[str, Any]) -> None:
         files = [
@@ -90,7 +107,6 @@ class _Starter:
             os.close(file)
 
     def _copy(self, order: dict[str, Any], files: Sequence[int]) -> None:
-        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGCHLD])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # this process has one thread
             pid = os.fork()
@@ -98,12 +114,11 @@ class _Starter:
             self._work(order["argv"], files)
         self._jobs[pid] = order["start"]
         self._say(job=order["start"], pid=pid)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGCHLD])
 
     def _work(self, words: Sequence[str], files: Sequence[int]) -> NoReturn:
         os.setsid()
+        signal.set_wakeup_fd(-1)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGCHLD])
         nothing = os.open(os.devnull, os.O_RDONLY)
         for source, target in zip((nothing, *files), (0, 1, 2), strict=True):
             os.dup2(source, target)
@@ -137,7 +152,7 @@ class _Starter:
 
         threading.Thread(target=wait, daemon=True).start()
 
-    def look(self) -> None:
+    def _look(self) -> None:
         """Say which jobs have ended."""
         for pid in list(self._jobs):
             done, status = os.waitpid(pid, os.WNOHANG)

@@ -207,3 +207,26 @@ def test_a_job_is_the_program_itself(tmp_path: Path, copies: bool) -> None:
     assert until(starter.ended) == {8: 2}
     assert "nonsense" in (tmp_path / "stderr").read_text()
     starter.close()
+
+
+MANY = """
+import sys
+from tirelib.studio import runner
+runner.main(lambda words: sys.exit(int(words[0])), loaded=())
+"""
+
+
+def test_jobs_that_end_at_the_same_time_are_all_told(tmp_path: Path) -> None:
+    starter = Starter((sys.executable, "-c", MANY))
+    files = {name: str(tmp_path / name) for name in ("stdout", "stderr")}
+    for number in range(60):
+        starter.start(number, {"argv": [str(number)], **files})
+    codes: dict[int, int] = {}
+
+    def all_told() -> bool:
+        codes.update(starter.ended())
+        return len(codes) == 60
+
+    until(all_told)
+    starter.close()
+    assert codes == {number: number for number in range(60)}
