@@ -25,6 +25,7 @@ from tirelib.infer.hypothesis import law_errors
 from tirelib.infer.null import OWN, Null
 from tirelib.infer.plain import BASE, Family, load, pooled
 from tirelib.infer.posterior import posterior, sizes_at_start
+from tirelib.infer.problem import Point
 from tirelib.infer.strain import StrainProblem
 from tirelib.threads import one_thread
 
@@ -65,13 +66,15 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
         values = _identified(runs, out / "values" / f"{case.family}-{file.stem}.pkl")
         problem = StrainProblem(runs, values, list(CATALOGUE.values()))
         own = max(family.own for family in others)
-        start = [np.zeros(CATALOGUE[kind].components)]
+        start = Point(
+            problem.start.base, (CATALOGUE[kind],), (np.zeros(CATALOGUE[kind].components),)
+        )
         fit = posterior(
             problem,
-            [CATALOGUE[kind]],
+            [effect],
             pooled(others, sizes_at_start(problem)),
             own,
-            strengths=start,
+            start=start,
         )
     except TirelibError as error:
         say(f"{file.name}: {error}")

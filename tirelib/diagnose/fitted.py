@@ -17,7 +17,7 @@ from tirelib.compare.model import Model
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 from tirelib.identify.delay import UNIT
-from tirelib.infer.hypothesis import Hypothesis
+from tirelib.infer.hypothesis import USUAL, Hypothesis
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Point
 from tirelib.infer.select import ROUGH, Hypotheses
@@ -109,7 +109,8 @@ class Fitted:
             self.effects,
             among.spread,
             among.own,
-            strengths=self.strengths,
+            start=start,
+            laws={name: rows[:, ~out] for name, rows in fit.laws(USUAL).items()},
             settled=ROUGH,
         )
         values = move(part.values, found.point.base[:-1], part.free)
@@ -166,7 +167,7 @@ def least_error(model: Fitted, given: Model, yardstick: Yardstick) -> tuple[Mode
                 {},
                 among.own,
                 near=found,
-                strengths=None if found else model.strengths,
+                start=None if found else point,
                 whiten=partial(_flat, reached),
                 settled=LEAST_GAIN * yardstick.strain.size,
             )

@@ -1,7 +1,7 @@
 """Identify a tire from a campaign: every number with an interval, and what it would take."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from tirelib.errors import ParameterError, TirelibError
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.discrepancy import COARSE, Discrepancy
 from tirelib.identify.estimate import Estimate
+from tirelib.identify.literature import OF_PLAIN, literature
 from tirelib.identify.next_run import NextRun, next_run
 from tirelib.identify.strain_notes import gage_notes, run_notes
 from tirelib.identify.structure import STRUCTURE_STD, WITHOUT_SHEAR
@@ -28,43 +29,8 @@ WIDEST = 0.25
 TOLD = 0.6
 """Share of the prior's deviation below which the campaign has told something."""
 
-_LITERATURE: Mapping[str, tuple[float, float, str]] = {
-    "bending_stiffness": (2.1, 0.5, "literature, Table 6-3: 1.57 to 4 N m^2"),
-    "tread_stiffness": (7.5e7, 0.5, "literature, Table 6-3: 5.1e7 to 9.9e7 N/m^2"),
-    "mass": (3.3, 0.15, "literature, Tables 6-1, 6-2: 3.15 kg/m"),
-    "extension_stiffness": (3.2e6, 0.6, "assumed: steel belts, 1 to 10 MN"),
-}
-_PLAIN: Mapping[str, tuple[float, float, str]] = {
-    "shear_stiffness": (6e4, 0.7, "assumed: 25 kN and more, of which the belt's tension takes 20"),
-    "rotary_inertia": (
-        5e-5,
-        1.0,
-        "rho A h^2 / 12 of 12.5 mm of belt and tread, and room for blocks",
-    ),
-    "tread_shear_stiffness": (2.5e7, 1.0, "k_t / 3, for rubber keeps its volume"),
-    "tread_hardening": (1.0, 0.7, "assumed: blocks bulge into their grooves"),
-    "section_pull": (0.03, 1.5, "assumed: growth of the belt and ply arches, 1 to 7 %"),
-    "liner_share": (0.3, 1.3, "0 of a gage on the belt itself, .8 under a thick liner"),
-    "tread_poisson": (0.3, 1.0, "0 of narrow blocks, .8 of solid rubber"),
-    "contact_crown": (0.12, 1.3, "assumed: crowns of .2 to 1.2 1/m, of which a belt keeps some"),
-    "tread_spread": (
-        0.3,
-        1.3,
-        "0 of a tread that stands like a brush, about .4 of finite-element treads",
-    ),
-    "centrifugal_tension": (
-        1.0,
-        0.01,
-        "1 of a belt alone; a third of the sidewalls' mass moves with it, about a half pulls",
-    ),
-    "creep": (0.004, 1.3, "assumed: rubber's friction grows up to .01 to 1 m/s of sliding, Grosch"),
-}
-"""Value, relative standard deviation and source of what no campaign header holds."""
 BASES = ("plain", "dissertation")
 """The plain tire, and the ring whose belt does not shear on a road without friction."""
-_RADIAL = (1.0, 2.4e5)
-_TANGENTIAL = (0.35, 1.1e5)
-"""Slope by pressure [m] and offset [N/m^2] of sidewall stiffnesses, about those of Table 6-3."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,23 +185,14 @@ def start_file(
     """
     if base not in BASES:
         raise ParameterError(f"base model {base!r}; allowed are {' and '.join(BASES)}")
-    numbers: dict[str, Number] = {}
     pressure = float(np.mean(runs.waves.conditions["pressure"]))
-    literature = {**_LITERATURE, **(_PLAIN if base == "plain" else {})}
-    for name, (value, share, source) in literature.items():
-        numbers[name] = Number(value, share * value, "literature", source)
-    for prefix, (slope, offset) in (("radial", _RADIAL), ("tangential", _TANGENTIAL)):
-        value = slope * pressure + offset
-        share = 0.4 if prefix == "radial" else 0.5
-        source = "literature, Table 6-3, at this pressure"
-        numbers[f"{prefix}_stiffness"] = Number(value, share * value, "literature", source)
-        numbers[f"{prefix}_pressure_slope"] = Number(slope, 1.0, "literature", source)
+    numbers = literature(pressure, plain=base == "plain")
     if tire is not None:
         numbers |= {
             name: number
             for name, number in tire.numbers.items()
             if name != "damping"
-            and (name not in _PLAIN or (base == "plain" and number.value > 0.0))
+            and (name not in OF_PLAIN or (base == "plain" and number.value > 0.0))
             and np.isfinite(number.value)
         }
     geometry = header.tire

@@ -127,6 +127,7 @@ class ForceProblem:
         load = bench.conditions.load
         self.names = fitted_constants(bench, quantity)
         self.start = Point(np.zeros(len(self.names)), tuple(effects), tuple(strengths))
+        self.starts = (self.start,)
         self.widths = np.full(len(self.names), WIDTH)
         self.ends = -np.full(len(self.names), np.inf), np.full(len(self.names), np.inf)
         self.size = float(np.sqrt(np.mean(self.measured**2))) * load / np.sqrt(np.mean(load**2))
@@ -207,10 +208,7 @@ class ForceProblem:
         return groups
 
     def roughly(
-        self,
-        effects: Sequence[Effect],
-        rows: Sequence[FloatArray],
-        ranges: Sequence[FloatArray],
+        self, point: Point, solved: ForceSolved, slopes: FloatArray, count: int
     ) -> Sequence[FloatArray]:
         """Return how the laws of effects may be off: smoothly over pairs of conditions.
 
@@ -220,10 +218,13 @@ class ForceProblem:
         has done most of what its condition does.
         """
         factors = self._factors()
-        done = [size @ each for size, each in zip(ranges, rows, strict=True)]
+        first, done = len(point.base), []
+        for size in point.ranges[:count]:
+            done.append(size @ slopes[first : first + len(size)])
+            first += len(size)
         whole = float(np.sqrt(sum(np.mean(each**2) for each in done)))
         slips, out = self._shapes() * self.size, []
-        for effect, each in zip(effects, done, strict=True):
+        for effect, each in zip(point.effects, done, strict=False):
             one = np.ones_like(self.size)
             own = [factors[name] for name in effect.varies_with if name in factors] or [one]
             pairs = [f * g for f in own for g in (one, *factors.values())]

@@ -135,6 +135,10 @@ class Posterior:
         by |= {effect.name: self.rows[effect.name] for effect in self.point.effects[self.count :]}
         return np.concatenate([self.rows[BASE][:base], *(by[e.name] for e in point.effects)])
 
+    def laws(self, law: float) -> dict[str, FloatArray]:
+        """Return the errors of the effects' laws, each row as large as laws are off by."""
+        return {name: law * rows for name, rows in self.rows.items() if name.startswith(ROUGHLY)}
+
     def view(self, problem: Problem, own: float) -> View:
         """Return the normal equations for one size of the misfit that each run has for itself."""
         whiten = problem.whitener(own)
@@ -160,7 +164,8 @@ def posterior(
     own: float,
     *,
     near: Posterior | None = None,
-    strengths: Sequence[FloatArray] | None = None,
+    start: Point | None = None,
+    laws: Mapping[str, FloatArray] | None = None,
     whiten: Callable[[FloatArray], FloatArray] | None = None,
     settled: float = SETTLED,
     progress: Callable[[str], None] | None = None,
@@ -180,8 +185,11 @@ def posterior(
         Size of each run's own misfit (`Problem.whitener`).
     near : Posterior, optional
         A fit nearby.
-    strengths : sequence of shape (components,), optional
-        From where the strengths start.
+    start : Point, optional
+        From where the fit starts, with the strengths of its first effects; the fit nearby or the
+        problem's start, without effects, by default.
+    laws : mapping of name to shape (k, ...), optional
+        Errors of the effects' laws, as large as laws are off by (`Posterior.laws`).
     whiten : callable, optional
         Turns rows (k, ...) into whitened ones (k, n); the problem's whitening by default.
     settled : float
@@ -195,17 +203,18 @@ def posterior(
     """
     names = {effect.name for effect in effects}
     others = [effect for effect in problem.living if effect.name not in names]
-    point = _start(problem, [*effects, *others], near, strengths)
+    point = _start(problem, [*effects, *others], near, start)
     whiten = whiten or problem.whitener(own)
     widths = [problem.widths, np.ones(sum(e.components for e in effects))]
     widths += [np.full(e.components, np.sqrt(max(spread.get(e.name, 0.0), LEAST))) for e in others]
     width = np.concatenate(widths)
     low, high = _ends(problem, others, len(width))
     solved = problem.solve(point, near.solved if near else None)
-    known = None if near is None or strengths is not None else near.slopes_at(point)
+    known = None if near is None or start is not None else near.slopes_at(point)
     slopes = problem.slopes(point, solved) if known is None else known
     exact = known is None or (near is not None and near.point.effects == point.effects)
-    shapes = problem.remainder(point, solved)
+    shapes = {**problem.remainder(point, solved), **(laws or {})}
+    spread = {**spread, **dict.fromkeys(laws or {}, 1.0)}
     white = whiten(np.concatenate(list(shapes.values())))
     ends = np.cumsum([len(rows) for rows in shapes.values()])[:-1]
     whitened = dict(zip(shapes, np.split(white, ends), strict=True))
@@ -270,7 +279,7 @@ def posterior(
     every, slopes = explaining(problem, point, solved, len(effects))
     count = len(every[BASE])
     rest_from_start = solved.rest + np.tensordot(coordinates_of(point), slopes, axes=1)
-    normal = Normal.of(every, solved.rest, whiten)
+    normal = Normal.of({**every, **(laws or {})}, solved.rest, whiten)
     metric = Weighed(normal, normal.spread(spread))
     block = normal.blocks[BASE]
     covariance = np.asarray(np.linalg.inv(metric.gram[block, block] + np.diag(width[:count] ** -2)))
@@ -302,12 +311,7 @@ def explaining(
         every[effect.name] = slopes[first : first + effect.components]
         first += effect.components
     every |= problem.remainder(point, solved)
-    first, rows = len(point.base), []
-    for effect in own:
-        rows.append(slopes[first : first + effect.components])
-        first += effect.components
-    ranges = [s / e.scale for e, s in zip(own, point.strengths, strict=False)]
-    for effect, errors in zip(own, problem.roughly(own, rows, ranges), strict=True):
+    for effect, errors in zip(own, problem.roughly(point, solved, slopes, count), strict=True):
         if not effect.exact:
             every[ROUGHLY + effect.name] = errors
     return every, slopes
@@ -315,9 +319,7 @@ def explaining(
 
 def sizes_at_start(problem: Problem) -> dict[str, float]:
     """Return mean squares of rows as `Posterior.sizes`, of the model where a fit starts."""
-    point = _start(
-        problem, [*problem.start.effects, *problem.living], None, problem.start.strengths
-    )
+    point = _start(problem, [*problem.start.effects, *problem.living], None, problem.start)
     solved = problem.solve(point)
     rows, _ = explaining(problem, point, solved, len(problem.start.effects))
     return _sizes(rows, problem.start.effects)
@@ -335,24 +337,21 @@ def _sizes(rows: Mapping[str, FloatArray], own: Sequence[Effect]) -> dict[str, f
 
 
 def _start(
-    problem: Problem,
-    effects: Sequence[Effect],
-    near: Posterior | None,
-    strengths: Sequence[FloatArray] | None,
+    problem: Problem, effects: Sequence[Effect], near: Posterior | None, start: Point | None
 ) -> Point:
     """Return the point from which a fit starts."""
-    given = list(strengths or ())
+    given = list(start.strengths if start else ())
     for effect in effects[len(given) :]:
         known = None if near is None else near.strength(effect.name)
         given.append(np.zeros(effect.components) if known is None else known)
-    base = problem.start.base if near is None else near.point.base
-    return Point(base, tuple(effects), tuple(np.array(s, dtype=float) for s in given))
+    if start is None:
+        start = problem.start if near is None else near.point
+    return Point(start.base, tuple(effects), tuple(np.array(s, dtype=float) for s in given))
 
 
 def coordinates_of(point: Point) -> FloatArray:
     """Return the base's coordinates and the strengths in ranges, (n_coordinates,)."""
-    ranges = [s / e.scale for e, s in zip(point.effects, point.strengths, strict=True)]
-    return np.concatenate([point.base, *ranges])
+    return np.concatenate([point.base, *point.ranges])
 
 
 def _ends(problem: Problem, others: Sequence[Effect], count: int) -> tuple[FloatArray, FloatArray]:

@@ -31,6 +31,11 @@ class Point:
     effects: tuple[Effect, ...] = ()
     strengths: tuple[FloatArray, ...] = ()
 
+    @property
+    def ranges(self) -> list[FloatArray]:
+        """Strengths in ranges, of shape (components,) each."""
+        return [s / e.scale for e, s in zip(self.effects, self.strengths, strict=True)]
+
 
 class Whitening(Protocol):
     """Turns rows (k, ...) into whitened ones (k, n)."""
@@ -60,6 +65,10 @@ class Problem(Protocol):
     @property
     def start(self) -> Point:
         """The model as the user has it."""
+
+    @property
+    def starts(self) -> Sequence[Point]:
+        """Where fits of the model start, `start` first: a fit ends in the valley it starts in."""
 
     @property
     def widths(self) -> FloatArray:
@@ -99,13 +108,10 @@ class Problem(Protocol):
         """Return groups of smooth shapes that no law describes, rows (k, ...) each."""
 
     def roughly(
-        self,
-        effects: Sequence[Effect],
-        rows: Sequence[FloatArray],
-        ranges: Sequence[FloatArray],
+        self, point: Point, solved: Any, slopes: FloatArray, count: int
     ) -> Sequence[FloatArray]:
-        """Return for each effect how its law may be off, rows (k, ...) as large as what it does.
+        """Return how the laws of the model's effects may be off, rows (k, ...) for each effect.
 
-        `rows` are (components, ...) for a strength of one range, `ranges` the strengths,
-        (components,).
+        They are as large as what the effect does. The model has the point's first `count` effects;
+        slopes are by all coordinates, as `slopes` gives them.
         """

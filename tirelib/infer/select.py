@@ -21,10 +21,10 @@ import numpy as np
 from tirelib.effects import Effect
 from tirelib.errors import ParameterError, TirelibError
 from tirelib.forked import forked
-from tirelib.infer.hypothesis import Hypothesis, judged
+from tirelib.infer.hypothesis import USUAL, Hypothesis, judged
 from tirelib.infer.plain import Family, pooled
 from tirelib.infer.posterior import SETTLED, Posterior, posterior, sizes_at_start
-from tirelib.infer.problem import Problem
+from tirelib.infer.problem import Point, Problem
 from tirelib.infer.rival import p_against
 from tirelib.threads import one_thread
 
@@ -125,7 +125,7 @@ class Hypotheses:
         self.own = max(family.own for family in families)
         self.had = problem.start.effects
         self.effects = {effect.name: effect for effect in problem.living}
-        fit = self._fitted(problem, None, ROUGH)
+        fit = self._first(problem)
         for _ in range(ROUNDS):
             # a whitening is right nearby only
             nearer = problem.about(fit.solved)
@@ -171,13 +171,13 @@ class Hypotheses:
         """Return a hypothesis from a fit nearby; None where no fit settles."""
         more = [self.effects[name] for name in names]
         try:
-            fit = posterior(
-                self.problem,
-                [*self.had, *more],
-                self.spread,
-                self.own,
-                near=near.fit,
-            )
+            effects = [*self.had, *more]
+            fits = partial(posterior, self.problem, effects, self.spread, self.own)
+            if all(effect.exact for effect in effects):
+                return self._tested(fits(near=near.fit))
+            # how a law may be off is known only where its effect is fitted
+            first = fits(near=near.fit, settled=ROUGH)
+            fit = fits(near=first, laws=first.laws(USUAL))
             return self._tested(fit)
         except TirelibError:
             return None
@@ -207,7 +207,25 @@ class Hypotheses:
         made = (each for key, each in self._made.items() if key)
         return tuple(each for each in made if each is not None)
 
-    def _fitted(self, problem: Problem, near: Posterior | None, settled: float) -> Posterior:
+    def _first(self, problem: Problem) -> Posterior:
+        """Return the best of the fits from all starts, without further effects."""
+
+        def fit(start: Point) -> Posterior | TirelibError:
+            try:
+                return self._fitted(problem, None, ROUGH, start)
+            except TirelibError as error:
+                return error
+
+        shared = [*self.had, *self.effects.values()]
+        found = forked([partial(fit, start) for start in problem.starts], shared)
+        settled = [each for each in found if isinstance(each, Posterior)]
+        if not settled:
+            raise next(each for each in found if isinstance(each, TirelibError))
+        return min(settled, key=lambda each: each.cost)
+
+    def _fitted(
+        self, problem: Problem, near: Posterior | None, settled: float, start: Point | None = None
+    ) -> Posterior:
         """Return the fit without further effects."""
         return posterior(
             problem,
@@ -215,9 +233,10 @@ class Hypotheses:
             self.spread,
             self.own,
             near=near,
-            strengths=None if near else problem.start.strengths,
+            start=start,
             settled=settled,
-            progress=self.progress,
+            # a copy of this process says nothing
+            progress=self.progress if start is None or start is problem.start else None,
         )
 
     def _tested(self, fit: Posterior) -> Hypothesis:

@@ -15,9 +15,10 @@ from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.delay import STD, UNIT, by_delay, earlier
+from tirelib.identify.literature import literature
 from tirelib.identify.random_effects import scales, tangents
 from tirelib.infer.problem import Point
-from tirelib.infer.strain_laws import SHAPES, as_large, law_errors
+from tirelib.infer.strain_laws import SHAPES, as_large, beside, law_errors, stiffened
 from tirelib.infer.strain_living import in_base, living
 from tirelib.infer.whiten import INSIDE, Whitener
 from tirelib.model import solution
@@ -30,7 +31,7 @@ from tirelib.model.solution import (
     by_effects,
     by_values,
 )
-from tirelib.model.state import Operating
+from tirelib.model.state import Operating, State
 from tirelib.rolling.assemble import Unknowns
 from tirelib.rolling.solve import Rolling
 from tirelib.waveforms import GRID
@@ -187,6 +188,7 @@ class StrainProblem:
         self.values = {**values, **means}
         begin = [float(np.max(c.distance(self.values[c.name], values[c.name]))) for c in self.free]
         self.start = Point(np.array([*begin, 0.0]), tuple(effects), tuple(strengths))
+        self.starts = (self.start, replace(self.start, base=self._of_literature()))
         self.widths = np.array([*(WIDTH[c.name] for c in self.free), STD / UNIT])
         ends = [c.ends(float(np.max(self.values[c.name]))) for c in self.free]
         low, high = np.array([*ends, (-np.inf, np.inf)]).T  # a delay has none
@@ -209,6 +211,21 @@ class StrainProblem:
 
         further = [effect for effect in catalogue if effect.name not in has]
         self.living, self.dead = living(further, self.data.points, signal)
+
+    def _of_literature(self) -> FloatArray:
+        """Return the base's coordinates, and no delay, of a tire as the literature has it.
+
+        Numbers that fit the runs well without an effect may lie in another valley than those that
+        fit them with it.
+        """
+        known = literature(float(np.max(self.values["pressure"])))
+        there = {c.name: known[c.name].value for c in self.free if c.name in known}
+        moves = np.zeros(len(self.free) + 1)
+        for k, c in enumerate(self.free):
+            own = float(np.max(self.values[c.name]))
+            if c.name in there and (c.unit or own):  # no factor moves a zero
+                moves[k] = c.distance(own, there[c.name])
+        return moves
 
     @property
     def half_angle(self) -> FloatArray:
@@ -422,15 +439,26 @@ class StrainProblem:
         return groups
 
     def roughly(
-        self,
-        effects: Sequence[Effect],
-        rows: Sequence[FloatArray],
-        ranges: Sequence[FloatArray],
+        self, point: Point, solved: StrainSolved, slopes: FloatArray, count: int
     ) -> Sequence[FloatArray]:
         """Return how what effects do would look if their laws were roughly right."""
-        each = zip(rows, ranges, strict=True)
         where = self.half_angle, self.data.points, self.present
-        return [law_errors(as_large(own, size), *where) for own, size in each]
+        state = State.of(solved.model.values, self.data.points, GRID)
+        first, out = len(point.base), []
+        for effect, strength, size in zip(
+            point.effects[:count], point.strengths, point.ranges, strict=False
+        ):
+            rows = slopes[first : first + effect.components]
+            first += effect.components
+            errors = [law_errors(as_large(rows, size), *where)]
+            if effect.hook == "constants" and effect.components == 1:
+                after = effect.at(float(strength[0]))[1](state)
+                errors += [
+                    beside(slopes[: len(self.free)], self.free, part, change)
+                    for part, change in stiffened(state, after).items()
+                ]
+            out.append(np.concatenate(errors))
+        return out
 
 
 def _with_changes(

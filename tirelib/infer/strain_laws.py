@@ -1,5 +1,7 @@
 """How what an effect does to the strain would look if its law were only roughly right."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from tirelib.arrays import FloatArray
@@ -10,7 +12,9 @@ from tirelib.identify.discrepancy import (
     Discrepancy,
     bumps,
 )
-from tirelib.model.state import Operating
+from tirelib.model.base import Coordinate
+from tirelib.model.state import Operating, State
+from tirelib.parameters import FIELDS
 from tirelib.waveforms import GRID
 
 SHAPES = Discrepancy(inside=1.0, outside=0.15, by_load=1.0, by_pressure=1.0, by_speed=1.0)
@@ -18,6 +22,10 @@ SHAPES = Discrepancy(inside=1.0, outside=0.15, by_load=1.0, by_pressure=1.0, by_
 KNOTS = 32
 """Bumps of an error's shape round the whole turn: what a sidewall or a heavy spot does, and gets
 wrong, ends nowhere."""
+SHARED = 5.0
+"""Size of an error by which another constant of the same part of the tire goes with the effect."""
+PARTS = {"k_u": "sidewall", "k_v": "sidewall", "k_t": "tread"}
+"""Stiffnesses of a state, and the part of the tire (`FIELDS`) that they belong to."""
 GOES, SHAPED, SHAPED_BY_SPEED, PLACED = 1.7, 1.7, 0.7, 0.2
 """Sizes of an error's parts over that of the law (`tirelib.infer.hypothesis.LAWS`): it goes
 otherwise with conditions, has another shape, one that goes with speed, is at another place or
@@ -69,6 +77,43 @@ def law_errors(
     by_speed = SHAPED_BY_SPEED / SHAPED * shape * conditions[1, :, None]
     placed = PLACED * np.concatenate(_elsewhere(rows, half_angle))
     return np.concatenate([otherwise, placed, shape, by_load, by_speed])
+
+
+def stiffened(before: State, after: State) -> dict[str, FloatArray]:
+    """Return by how much the stiffness of each part of a tire changes, (n_runs,), log ratio."""
+    out: dict[str, FloatArray] = {}
+    for name, part in PARTS.items():
+        change = np.log(getattr(after, name) / getattr(before, name))
+        if np.any(change):
+            out[part] = change
+    return out
+
+
+def beside(
+    slopes: FloatArray, free: Sequence[Coordinate], part: str, change: FloatArray
+) -> FloatArray:
+    """Return errors of a law that leaves the other constants of a part as they are.
+
+    What makes rubber softer, or a part stiffer, changes all that the part is made of: how the tread
+    is sheared, how much it thickens, what the sidewall holds along the belt. Each constant changes
+    by as much as the stiffness does.
+
+    Parameters
+    ----------
+    slopes : shape (n_free, n_runs, n_phi)
+        By the coordinates.
+    free : sequence of Coordinate
+    part : str
+        Part of the tire, as `FIELDS` has it.
+    change : shape (n_runs,)
+        Of the stiffness, log ratio.
+
+    Returns
+    -------
+    shape (n_constants, n_runs, n_phi)
+    """
+    own = [k for k, coordinate in enumerate(free) if FIELDS[coordinate.name].group == part]
+    return np.asarray(SHARED * change[:, None] * slopes[own])
 
 
 def as_large(rows: FloatArray, ranges: FloatArray) -> FloatArray:

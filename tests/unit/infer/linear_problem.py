@@ -1,6 +1,6 @@
 """A linear problem without any tire: what a model leaves is known exactly."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,6 +66,7 @@ class Toy:
         if alike:
             self.by["bend"] = self.by["twist"] + 1e-6 * self.by["bend"]
         self.start = Point(np.zeros(3))
+        self.starts = (self.start,)
         self.widths = np.full(3, 10.0)
         self.ends = np.full(3, -np.inf), np.full(3, np.inf)
         self.dead: Mapping[str, str] = {}
@@ -90,10 +91,20 @@ class Toy:
         return {"smooth, all": self.shapes, "smooth, there": self.there}
 
     def roughly(
-        self, effects: Any, rows: Sequence[FloatArray], ranges: Sequence[FloatArray]
+        self, point: Point, solved: Any, slopes: FloatArray, count: int
     ) -> list[FloatArray]:
-        each = zip(rows, ranges, strict=True)
+        each = by_effect(point, slopes, count)
         return [np.linalg.norm(size) * own * np.sin(np.arange(N) / 10.0) for own, size in each]
+
+
+def by_effect(
+    point: Point, slopes: FloatArray, count: int
+) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield the slopes of each of the first effects, and its strength, in ranges."""
+    first = len(point.base)
+    for size in point.ranges[:count]:
+        yield slopes[first : first + len(size)], size
+        first += len(size)
 
 
 def drawn(random: np.random.Generator, *, size: float = 1.0, **planted: float) -> FloatArray:

@@ -1,5 +1,6 @@
 """The problem of forces: slopes, dead effects, whitening, and planted effects in plain tires."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.unit.force_points import force_problem
+from tirelib.arrays import FloatArray
 from tirelib.effects import CATALOGUE, effect
 from tirelib.infer.plain import Family
 from tirelib.infer.posterior import posterior
@@ -127,14 +129,21 @@ def test_a_laws_error_is_as_large_as_what_all_effects_do_and_goes_with_pairs_of_
     at, size = made.bench.conditions, made.size
     effects = [CATALOGUE["friction_load"], CATALOGUE["friction_pressure"]]
     large, small = (0.1 * size * np.sign(made.slip))[None], (1e-6 * size)[None]
-    one = np.ones(1)
-    alone = made.roughly(effects[:1], [large], [one])
-    both = made.roughly(effects, [large, small], [one, one])
+    base = made.start.base
+    solved = made.solve(made.start)
+    slopes = np.concatenate([np.zeros((len(base), *large.shape[1:])), large, small])
+
+    def errors(times: float, count: int = 2) -> Sequence[FloatArray]:
+        scales = [times * effects[0].scale, effects[1].scale]
+        point = Point(base, tuple(effects), tuple(np.array([s]) for s in scales))
+        return made.roughly(point, solved, slopes, count)
+
+    alone, both = errors(1.0, 1), errors(1.0)
     np.testing.assert_allclose(both[0], alone[0], rtol=1e-6)
     # the small one's law is off by as much as the large one's
     strength = [np.sqrt(np.mean(np.sum(rows**2, axis=0))) for rows in both]
     assert strength[1] == pytest.approx(strength[0], rel=0.5)
-    double = made.roughly(effects, [large, small], [2.0 * one, one])
+    double = errors(2.0)
     np.testing.assert_allclose(double[0], 2.0 * both[0], rtol=1e-6)
     # friction over pressure that goes with the load, on one side of the slip
     pair = size * (at.pressure / np.median(at.pressure) - 1.0) * np.log(at.load / 4e3)

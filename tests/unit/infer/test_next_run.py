@@ -1,13 +1,12 @@
 """A further run in a linear problem: what it must show to put a wrong hypothesis out of the set."""
 
-from collections.abc import Sequence
 from copy import copy
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.unit.infer.linear_problem import N, Solved, Toy, drawn, family
+from tests.unit.infer.linear_problem import N, Solved, Toy, by_effect, drawn, family
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.infer.next_run import next_runs
 from tirelib.infer.select import Hypotheses
@@ -60,13 +59,10 @@ class Ahead(Toy):
     def solve(self, point: Any, near: Any = None) -> Solved:
         return super().solve(point, near)
 
-    def roughly(
-        self, effects: Any, rows: Sequence[FloatArray], ranges: Sequence[FloatArray]
-    ) -> list[FloatArray]:
-        each = zip(rows, ranges, strict=True)
+    def roughly(self, point: Any, solved: Any, slopes: FloatArray, count: int) -> list[FloatArray]:
         return [
             np.linalg.norm(size) * own * np.sin(np.arange(own.shape[1]) / 10.0)
-            for own, size in each
+            for own, size in by_effect(point, slopes, count)
         ]
 
 

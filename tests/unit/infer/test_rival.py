@@ -1,13 +1,13 @@
 """A rival that explains the runs much better puts a hypothesis out of the set."""
 
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from tests.unit.infer.linear_problem import EFFECTS, N, Toy, drawn, family
+from tests.unit.infer.linear_problem import EFFECTS, N, Toy, by_effect, drawn, family
 from tirelib.arrays import FloatArray
-from tirelib.effects import Effect
 from tirelib.infer.hypothesis import LAWS
+from tirelib.infer.problem import Point
 from tirelib.infer.rival import p_against
 from tirelib.infer.select import Hypotheses, select
 
@@ -27,14 +27,14 @@ class Covered(Toy):
         self.by["bend"] = self.by["twist"] + off
 
     def roughly(
-        self, effects: Sequence[Effect], rows: Sequence[FloatArray], ranges: Sequence[FloatArray]
+        self, point: Point, solved: Any, slopes: FloatArray, count: int
     ) -> list[FloatArray]:
         exact = {"swell": 1.0, "bend": 1e-3, "twist": 1.0}
         whole = float(np.linalg.norm(self.by["twist"]))
-        size = [float(np.linalg.norm(r @ own)) / whole for r, own in zip(ranges, rows, strict=True)]
+        done = [float(np.linalg.norm(r @ own)) for own, r in by_effect(point, slopes, count)]
         return [
-            exact[effect.name] * each * self.ways
-            for effect, each in zip(effects, size, strict=True)
+            exact[effect.name] * each / whole * self.ways
+            for effect, each in zip(point.effects, done, strict=False)
         ]
 
 
@@ -42,7 +42,9 @@ def planted(name: str, seed: int) -> Covered:
     random = np.random.default_rng(seed)
     toy = Covered(drawn(random))
     done = STRENGTH * toy.by[name][0]
-    (ways,) = toy.roughly([EFFECTS[name]], [done[None]], [np.ones(1)])
+    one = Point(toy.start.base, (EFFECTS[name],), (np.array([EFFECTS[name].scale]),))
+    slopes = np.concatenate([toy.base, STRENGTH * toy.by[name]])
+    (ways,) = toy.roughly(one, None, slopes, 1)
     toy.measured = toy.measured + done + LAW * random.standard_normal(WAYS) @ ways
     return toy
 

@@ -1,17 +1,17 @@
 """The confidence set on a linear problem whose truth is known."""
 
-from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.unit.infer.linear_problem import SHAPES, N, Toy, drawn, family
 from tirelib.arrays import FloatArray
-from tirelib.effects import Effect
 from tirelib.errors import ParameterError
 from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.posterior import Posterior, posterior
+from tirelib.infer.problem import Point
 from tirelib.infer.select import Hypotheses, select
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
@@ -126,9 +126,9 @@ class Rough(Toy):
         self.living = tuple(replace(effect, exact=exact) for effect in self.living)
 
     def roughly(
-        self, effects: Sequence[Effect], rows: Sequence[FloatArray], ranges: Sequence[FloatArray]
+        self, point: Point, solved: Any, slopes: FloatArray, count: int
     ) -> list[FloatArray]:
-        return [np.linalg.norm(size) * self.ways for size in ranges]
+        return [np.linalg.norm(size) * self.ways for size in point.ranges[:count]]
 
 
 def test_a_law_that_is_a_definition_has_no_error() -> None:

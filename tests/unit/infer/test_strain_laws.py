@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from tests.unit.identify.model_waves import operating
-from tirelib.infer.strain_laws import GOES, PLACED, as_large, law_errors
+from tests.unit.identify.model_waves import TIRE, operating
+from tirelib.infer.strain_laws import GOES, PLACED, as_large, beside, law_errors, stiffened
+from tirelib.model.base import PLAIN, values_of
+from tirelib.model.state import State
 from tirelib.waveforms import GRID
 
 LOAD = np.array([2000.0, 4000.0, 6000.0])
@@ -72,3 +74,30 @@ def test_a_law_may_be_wrong_opposite_to_the_contact() -> None:
 def test_errors_grow_with_the_effect() -> None:
     one, three = (law_errors(k * BUMP[None], HALF, POINTS, 3) for k in (1.0, 3.0))
     assert three == pytest.approx(3.0 * one)
+
+
+def test_a_law_of_one_stiffness_is_off_by_what_else_that_part_of_the_tire_is_made_of() -> None:
+    state = State.of(values_of(TIRE), POINTS, GRID)
+    soft = np.array([0.9, 1.0, 1.1])
+    random = np.random.default_rng(3)
+    slopes = random.standard_normal((len(PLAIN), 3, GRID.size))
+    for change, part, others in (
+        ({"k_t": state.k_t * soft}, "tread", ("tread_poisson", "tread_shear_stiffness")),
+        ({"k_u": state.k_u * soft}, "sidewall", ("tangential_stiffness", "section_pull")),
+    ):
+        found = stiffened(state, state.but(**change))
+        assert list(found) == [part]
+        assert found[part] == pytest.approx(np.log(soft))
+        errors = beside(slopes, PLAIN, part, found[part])
+        names = [coordinate.name for coordinate in PLAIN]
+        for name in others:
+            # a constant of the same part changes run by run, as the stiffness does
+            row = np.log(soft)[:, None] * slopes[names.index(name)]
+            assert share_outside(row, errors) < 1e-6
+        belt = np.log(soft)[:, None] * slopes[names.index("shear_stiffness")]
+        assert share_outside(belt, errors) > 0.9
+
+
+def test_a_law_that_makes_nothing_stiffer_has_no_such_error() -> None:
+    state = State.of(values_of(TIRE), POINTS, GRID)
+    assert stiffened(state, state.but(tension=state.tension + 100.0)) == {}
