@@ -71,7 +71,7 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
         )
         fit = posterior(
             problem,
-            [effect],
+            [CATALOGUE[kind]],
             pooled(others, sizes_at_start(problem)),
             own,
             start=start,

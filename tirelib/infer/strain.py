@@ -444,6 +444,7 @@ class StrainProblem:
         """Return how what effects do would look if their laws were roughly right."""
         where = self.half_angle, self.data.points, self.present
         state = State.of(solved.model.values, self.data.points, GRID)
+        state = state.but(deflection=solved.model.deflection)
         first, out = len(point.base), []
         for effect, strength, size in zip(
             point.effects[:count], point.strengths, point.ranges, strict=False

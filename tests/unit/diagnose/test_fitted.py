@@ -139,7 +139,7 @@ def test_a_strength_does_not_depend_on_where_the_fit_starts() -> None:
     assert abs(one.strengths[0] - other.strengths[0])[0] < 0.3 * min(one.std(0)[0], other.std(0)[0])
 
 
-def test_the_base_is_fitted_once_and_its_whitening_is_about_that_fit(
+def test_the_base_is_fitted_once_from_each_start_and_its_whitening_is_about_that_fit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     starts = []
@@ -152,8 +152,10 @@ def test_the_base_is_fitted_once_and_its_whitening_is_about_that_fit(
     measured, near = runs(), values_of(TIRE)
     given = StrainProblem(measured, {**near, "tread_stiffness": 2.0 * TIRE.tread_stiffness}, ())
     among = Hypotheses(given, plain_tires())
-    # every fit but the first goes on from the one before
-    assert [start is None for start in starts] == [True] + [False] * (len(starts) - 1)
+    # every fit but those from the starts, some of which a copy of this process makes, goes on
+    alone = sum(start is None for start in starts)
+    assert 1 <= alone <= len(given.starts)
+    assert all(start is not None for start in starts[alone:])
     assert isinstance(among.problem, StrainProblem)
     apart = among.base.fit.solved.waveform - among.problem.reference.waveform
     assert np.std(apart) < 0.01 * np.std(measured.strain)
