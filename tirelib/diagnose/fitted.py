@@ -17,7 +17,7 @@ from tirelib.compare.model import Model
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 from tirelib.identify.delay import UNIT
-from tirelib.infer.hypothesis import USUAL, Hypothesis
+from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Point
 from tirelib.infer.select import ROUGH, Hypotheses
@@ -110,7 +110,6 @@ class Fitted:
             among.spread,
             among.own,
             start=start,
-            laws={name: rows[:, ~out] for name, rows in fit.laws(USUAL).items()},
             settled=ROUGH,
         )
         values = move(part.values, found.point.base[:-1], part.free)

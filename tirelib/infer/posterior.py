@@ -135,10 +135,6 @@ class Posterior:
         by |= {effect.name: self.rows[effect.name] for effect in self.point.effects[self.count :]}
         return np.concatenate([self.rows[BASE][:base], *(by[e.name] for e in point.effects)])
 
-    def laws(self, law: float) -> dict[str, FloatArray]:
-        """Return the errors of the effects' laws, each row as large as laws are off by."""
-        return {name: law * rows for name, rows in self.rows.items() if name.startswith(ROUGHLY)}
-
     def view(self, problem: Problem, own: float) -> View:
         """Return the normal equations for one size of the misfit that each run has for itself."""
         whiten = problem.whitener(own)
@@ -165,7 +161,6 @@ def posterior(
     *,
     near: Posterior | None = None,
     start: Point | None = None,
-    laws: Mapping[str, FloatArray] | None = None,
     whiten: Callable[[FloatArray], FloatArray] | None = None,
     settled: float = SETTLED,
     progress: Callable[[str], None] | None = None,
@@ -188,8 +183,6 @@ def posterior(
     start : Point, optional
         From where the fit starts, with the strengths of its first effects; the fit nearby or the
         problem's start, without effects, by default.
-    laws : mapping of name to shape (k, ...), optional
-        Errors of the effects' laws, as large as laws are off by (`Posterior.laws`).
     whiten : callable, optional
         Turns rows (k, ...) into whitened ones (k, n); the problem's whitening by default.
     settled : float
@@ -213,8 +206,7 @@ def posterior(
     known = None if near is None or start is not None else near.slopes_at(point)
     slopes = problem.slopes(point, solved) if known is None else known
     exact = known is None or (near is not None and near.point.effects == point.effects)
-    shapes = {**problem.remainder(point, solved), **(laws or {})}
-    spread = {**spread, **dict.fromkeys(laws or {}, 1.0)}
+    shapes = problem.remainder(point, solved)
     white = whiten(np.concatenate(list(shapes.values())))
     ends = np.cumsum([len(rows) for rows in shapes.values()])[:-1]
     whitened = dict(zip(shapes, np.split(white, ends), strict=True))
@@ -279,7 +271,7 @@ def posterior(
     every, slopes = explaining(problem, point, solved, len(effects))
     count = len(every[BASE])
     rest_from_start = solved.rest + np.tensordot(coordinates_of(point), slopes, axes=1)
-    normal = Normal.of({**every, **(laws or {})}, solved.rest, whiten)
+    normal = Normal.of(every, solved.rest, whiten)
     metric = Weighed(normal, normal.spread(spread))
     block = normal.blocks[BASE]
     covariance = np.asarray(np.linalg.inv(metric.gram[block, block] + np.diag(width[:count] ** -2)))

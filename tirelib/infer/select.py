@@ -21,7 +21,7 @@ import numpy as np
 from tirelib.effects import Effect
 from tirelib.errors import ParameterError, TirelibError
 from tirelib.forked import forked
-from tirelib.infer.hypothesis import USUAL, Hypothesis, judged
+from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.plain import Family, pooled
 from tirelib.infer.posterior import SETTLED, Posterior, posterior, sizes_at_start
 from tirelib.infer.problem import Point, Problem
@@ -172,12 +172,7 @@ class Hypotheses:
         more = [self.effects[name] for name in names]
         try:
             effects = [*self.had, *more]
-            fits = partial(posterior, self.problem, effects, self.spread, self.own)
-            if all(effect.exact for effect in effects):
-                return self._tested(fits(near=near.fit))
-            # how a law may be off is known only where its effect is fitted
-            first = fits(near=near.fit, settled=ROUGH)
-            fit = fits(near=first, laws=first.laws(USUAL))
+            fit = posterior(self.problem, effects, self.spread, self.own, near=near.fit)
             return self._tested(fit)
         except TirelibError:
             return None

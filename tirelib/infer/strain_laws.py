@@ -90,13 +90,14 @@ def stiffened(before: State, after: State) -> dict[str, FloatArray]:
 
 
 def beside(
-    slopes: FloatArray, free: Sequence[Coordinate], part: str, change: FloatArray
+    slopes: FloatArray, free: Sequence[Coordinate], part: str, change: FloatArray, rows: FloatArray
 ) -> FloatArray:
     """Return errors of a law that leaves the other constants of a part as they are.
 
     What makes rubber softer, or a part stiffer, changes all that the part is made of: how the tread
     is sheared, how much it thickens, what the sidewall holds along the belt. Each constant changes
-    by as much as the stiffness does.
+    by as much as the stiffness does. What looks like the effect itself is its strength, and no
+    error.
 
     Parameters
     ----------
@@ -107,13 +108,17 @@ def beside(
         Part of the tire, as `FIELDS` has it.
     change : shape (n_runs,)
         Of the stiffness, log ratio.
+    rows : shape (1, n_runs, n_phi)
+        What the effect does.
 
     Returns
     -------
     shape (n_constants, n_runs, n_phi)
     """
     own = [k for k, coordinate in enumerate(free) if FIELDS[coordinate.name].group == part]
-    return np.asarray(SHARED * change[:, None] * slopes[own])
+    errors = SHARED * change[:, None] * slopes[own]
+    share = np.tensordot(errors, rows[0], axes=2) / np.sum(rows**2)
+    return np.asarray(errors - share[:, None, None] * rows)
 
 
 def as_large(rows: FloatArray, ranges: FloatArray) -> FloatArray:

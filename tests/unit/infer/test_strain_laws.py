@@ -81,19 +81,32 @@ def test_a_law_of_one_stiffness_is_off_by_what_else_that_part_of_the_tire_is_mad
     soft = np.array([0.9, 1.0, 1.1])
     random = np.random.default_rng(3)
     slopes = random.standard_normal((len(PLAIN), 3, GRID.size))
-    for change, part, others in (
-        ({"k_t": state.k_t * soft}, "tread", ("tread_poisson", "tread_shear_stiffness")),
-        ({"k_u": state.k_u * soft}, "sidewall", ("tangential_stiffness", "section_pull")),
+    for change, part, stiffness, others in (
+        (
+            {"k_t": state.k_t * soft},
+            "tread",
+            "tread_stiffness",
+            ("tread_poisson", "tread_shear_stiffness"),
+        ),
+        (
+            {"k_u": state.k_u * soft},
+            "sidewall",
+            "radial_stiffness",
+            ("tangential_stiffness", "section_pull"),
+        ),
     ):
         found = stiffened(state, state.but(**change))
         assert list(found) == [part]
         assert found[part] == pytest.approx(np.log(soft))
-        errors = beside(slopes, PLAIN, part, found[part])
         names = [coordinate.name for coordinate in PLAIN]
+        own = np.log(soft)[:, None] * slopes[[names.index(stiffness)]]
+        errors = beside(slopes, PLAIN, part, found[part], own)
+        # the effect itself is no error of its law
+        assert share_outside(own, errors) == pytest.approx(1.0)
         for name in others:
             # a constant of the same part changes run by run, as the stiffness does
             row = np.log(soft)[:, None] * slopes[names.index(name)]
-            assert share_outside(row, errors) < 1e-6
+            assert share_outside(row, np.concatenate([errors, own])) < 1e-6
         belt = np.log(soft)[:, None] * slopes[names.index("shear_stiffness")]
         assert share_outside(belt, errors) > 0.9
 
