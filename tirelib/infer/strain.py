@@ -455,7 +455,7 @@ class StrainProblem:
             if effect.hook == "constants" and effect.components == 1:
                 after = effect.at(float(strength[0]))[1](state)
                 errors += [
-                    beside(slopes[: len(self.free)], self.free, part, change, rows)
+                    beside(slopes[: len(self.free)], self.free, part, change, rows, self.present)
                     for part, change in stiffened(state, after).items()
                 ]
             out.append(np.concatenate(errors))

@@ -90,7 +90,12 @@ def stiffened(before: State, after: State) -> dict[str, FloatArray]:
 
 
 def beside(
-    slopes: FloatArray, free: Sequence[Coordinate], part: str, change: FloatArray, rows: FloatArray
+    slopes: FloatArray,
+    free: Sequence[Coordinate],
+    part: str,
+    change: FloatArray,
+    rows: FloatArray,
+    present: int,
 ) -> FloatArray:
     """Return errors of a law that leaves the other constants of a part as they are.
 
@@ -110,6 +115,8 @@ def beside(
         Of the stiffness, log ratio.
     rows : shape (1, n_runs, n_phi)
         What the effect does.
+    present : int
+        Runs that are measured, the first ones: what looks like the effect does so in them.
 
     Returns
     -------
@@ -117,7 +124,8 @@ def beside(
     """
     own = [k for k, coordinate in enumerate(free) if FIELDS[coordinate.name].group == part]
     errors = SHARED * change[:, None] * slopes[own]
-    share = np.tensordot(errors, rows[0], axes=2) / np.sum(rows**2)
+    here = rows[0, :present]
+    share = np.tensordot(errors[:, :present], here, axes=2) / np.sum(here**2)
     return np.asarray(errors - share[:, None, None] * rows)
 
 

@@ -100,7 +100,7 @@ def test_a_law_of_one_stiffness_is_off_by_what_else_that_part_of_the_tire_is_mad
         assert found[part] == pytest.approx(np.log(soft))
         names = [coordinate.name for coordinate in PLAIN]
         own = np.log(soft)[:, None] * slopes[[names.index(stiffness)]]
-        errors = beside(slopes, PLAIN, part, found[part], own)
+        errors = beside(slopes, PLAIN, part, found[part], own, 3)
         # the effect itself is no error of its law
         assert share_outside(own, errors) == pytest.approx(1.0)
         for name in others:
@@ -114,3 +114,12 @@ def test_a_law_of_one_stiffness_is_off_by_what_else_that_part_of_the_tire_is_mad
 def test_a_law_that_makes_nothing_stiffer_has_no_such_error() -> None:
     state = State.of(values_of(TIRE), POINTS, GRID)
     assert stiffened(state, state.but(tension=state.tension + 100.0)) == {}
+
+
+def test_a_run_ahead_changes_no_error_of_the_runs_that_are_measured() -> None:
+    random = np.random.default_rng(4)
+    slopes = random.standard_normal((len(PLAIN), 3, GRID.size))
+    change, rows = np.array([-0.1, 0.0, 0.2]), random.standard_normal((1, 3, GRID.size))
+    three = beside(slopes, PLAIN, "tread", change, rows, 2)
+    two = beside(slopes[:, :2], PLAIN, "tread", change[:2], rows[:, :2], 2)
+    assert three[:, :2] == pytest.approx(two)
