@@ -10,11 +10,13 @@ from tirelib.arrays import FloatArray
 from tirelib.effects import CATALOGUE
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
+from tirelib.identify.literature import literature
 from tirelib.identify.random_effects import scales, tangents
 from tirelib.infer.posterior import posterior
 from tirelib.infer.problem import Point
 from tirelib.infer.strain import StrainProblem
 from tirelib.infer.whiten import Whitener
+from tirelib.model.base import move
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID
 
@@ -41,6 +43,21 @@ def test_a_narrow_prior_stands_where_it_comes_from(problem: StrainProblem) -> No
     assert there.made.constants.tension == pytest.approx(
         held.made.constants.tension + 0.05 * spun(problem)
     )
+
+
+def test_one_start_is_a_tire_as_the_literature_has_it(problem: StrainProblem) -> None:
+    own, other = problem.starts
+    assert own is problem.start
+    there = move(problem.values, other.base[:-1], problem.free)
+    known = literature(float(np.max(problem.values["pressure"])))
+    for coordinate in problem.free:
+        value = there[coordinate.name]
+        if coordinate.name in known:
+            assert value == pytest.approx(known[coordinate.name].value)
+        else:  # the gages' place is measured
+            assert value == problem.values[coordinate.name]
+    assert "shear_stiffness" in known
+    assert other.base[-1] == 0.0
 
 
 def spun(problem: StrainProblem) -> FloatArray:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.unit.infer.linear_problem import SHAPES, N, Toy, drawn, family
+from tests.unit.infer.linear_problem import SHAPES, N, Solved, Toy, drawn, family
 from tirelib.arrays import FloatArray
 from tirelib.errors import ParameterError
 from tirelib.infer.hypothesis import Hypothesis, judged
@@ -160,3 +160,33 @@ def test_more_effects_that_are_not_likelier_say_that_a_law_is_not_right(
     ((name,),) = found.sets
     one = max((h for h in found.tried if len(h.names) == 1), key=lambda h: h.likelihood)
     assert one.names == (name,)
+
+
+class Valleys(Toy):
+    """The first number of the base acts as z^3 - 3 z: from below a fit ends at z = -1."""
+
+    def __init__(self, *starts: float) -> None:
+        super().__init__(np.zeros(N))
+        self.measured = drawn(np.random.default_rng(5)) + 12.0 * self.base[0]
+        self.starts = tuple(Point(np.array([z, 0.0, 0.0])) for z in starts)
+        self.start = self.starts[0]
+
+    def solve(self, point: Point, near: Any = None) -> Solved:
+        z = float(point.base[0])
+        bent = np.array([z**3 - 3.0 * z, *point.base[1:]])
+        return super().solve(replace(point, base=bent), near)
+
+    def slopes(self, point: Point, solved: Any, *, near: bool = False) -> FloatArray:
+        out = super().slopes(point, solved, near=near)
+        out[0] *= 3.0 * point.base[0] ** 2 - 3.0
+        return out
+
+
+@pytest.mark.parametrize("starts", [(-1.5, 2.0), (2.0, -1.5)])
+def test_the_base_is_the_best_fit_of_those_from_all_starts(starts: tuple[float, float]) -> None:
+    stuck = Hypotheses(Valleys(-1.5), FAMILIES).base.fit
+    best = Hypotheses(Valleys(*starts), FAMILIES).base.fit
+    # z^3 - 3 z is 12 near 2.7; below zero it is at most 2, at z = -1
+    assert stuck.point.base[0] == pytest.approx(-1.0, abs=0.1)
+    assert best.point.base[0] == pytest.approx(2.71, abs=0.1)
+    assert best.cost < 0.1 * stuck.cost
