@@ -15,6 +15,7 @@ there.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from tirelib.errors import ParameterError, TirelibError
 from tirelib.forked import forked
 from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.plain import Family, pooled
-from tirelib.infer.posterior import SETTLED, Posterior, posterior, sizes_at_start
+from tirelib.infer.posterior import Posterior, posterior, sizes_at_start
 from tirelib.infer.problem import Point, Problem
 from tirelib.infer.rival import p_against
 from tirelib.threads import one_thread
@@ -125,15 +126,7 @@ class Hypotheses:
         self.own = max(family.own for family in families)
         self.had = problem.start.effects
         self.effects = {effect.name: effect for effect in problem.living}
-        fit = self._first(problem)
-        for _ in range(ROUNDS):
-            # a whitening is right nearby only
-            nearer = problem.about(fit.solved)
-            if nearer is problem or fit.far:
-                break  # a model that is far off has no whitening that is right
-            problem, fit = nearer, self._fitted(nearer, fit, ROUGH)
-        self.problem = problem
-        self.base = self._tested(self._fitted(problem, fit, SETTLED))
+        self.problem, self.base = self._begun(problem)
         self._made: dict[frozenset[str], Hypothesis | None] = {frozenset(): self.base}
 
     def at(self, names: Sequence[str], near: Hypothesis | None = None) -> Hypothesis | None:
@@ -173,7 +166,7 @@ class Hypotheses:
         try:
             effects = [*self.had, *more]
             fit = posterior(self.problem, effects, self.spread, self.own, near=near.fit)
-            return self._tested(fit)
+            return self._tested(self.problem, fit)
         except TirelibError:
             return None
 
@@ -202,41 +195,42 @@ class Hypotheses:
         made = (each for key, each in self._made.items() if key)
         return tuple(each for each in made if each is not None)
 
-    def _first(self, problem: Problem) -> Posterior:
-        """Return the best of the fits from all starts, without further effects."""
-
-        def fit(start: Point) -> Posterior | TirelibError:
-            try:
-                return self._fitted(problem, None, ROUGH, start)
-            except TirelibError as error:
-                return error
-
-        shared = [*self.had, *self.effects.values()]
-        found = forked([partial(fit, start) for start in problem.starts], shared)
-        settled = [each for each in found if isinstance(each, Posterior)]
+    def _begun(self, problem: Problem) -> tuple[Problem, Hypothesis]:
+        """Return the problem about the likeliest fit without further effects, and this fit."""
+        shared = [*self.had, *self.effects.values(), *self.families]
+        found = forked([partial(self._from, problem, start) for start in problem.starts], shared)
+        settled = [each for each in found if not isinstance(each, TirelibError)]
         if not settled:
             raise next(each for each in found if isinstance(each, TirelibError))
-        return min(settled, key=lambda each: each.cost)
+        passed, base = max(settled, key=lambda each: each[1].likelihood)
+        for solved in passed:
+            problem = problem.about(solved)
+        return problem, base
 
-    def _fitted(
-        self, problem: Problem, near: Posterior | None, settled: float, start: Point | None = None
-    ) -> Posterior:
-        """Return the fit without further effects."""
-        return posterior(
-            problem,
-            self.had,
-            self.spread,
-            self.own,
-            near=near,
-            start=start,
-            settled=settled,
-            # a copy of this process says nothing
-            progress=self.progress if start is None or start is problem.start else None,
+    def _from(self, problem: Problem, start: Point) -> tuple[list[Any], Hypothesis] | TirelibError:
+        """Return the fit from a start, and the solutions that its whitening was about in turn."""
+        passed: list[Any] = []
+        # the copy of this process that has another start says nothing
+        progress = self.progress if start is problem.start else None
+        fits = partial(
+            posterior, effects=self.had, spread=self.spread, own=self.own, progress=progress
         )
+        try:
+            fit = fits(problem, start=start, settled=ROUGH)
+            for _ in range(ROUNDS):
+                # a whitening is right nearby only
+                nearer = problem.about(fit.solved)
+                if nearer is problem or fit.far:
+                    break  # a model that is far off has no whitening that is right
+                passed.append(fit.solved)
+                problem, fit = nearer, fits(nearer, near=fit, settled=ROUGH)
+            return passed, self._tested(problem, fits(problem, near=fit))
+        except TirelibError as error:
+            return error
 
-    def _tested(self, fit: Posterior) -> Hypothesis:
+    def _tested(self, problem: Problem, fit: Posterior) -> Hypothesis:
         had = len(self.had)
-        return judged(self.problem, fit, self.families, self.false_alarm, own_effects=had)
+        return judged(problem, fit, self.families, self.false_alarm, own_effects=had)
 
 
 @one_thread()

@@ -149,9 +149,9 @@ def test_more_effects_that_are_not_likelier_say_that_a_law_is_not_right(
     toy = Toy(drawn(np.random.default_rng(2), bend=0.6, twist=0.6))
     tested = Hypotheses._tested
 
-    def dearer(self: Hypotheses, fit: Posterior) -> Hypothesis:
+    def dearer(self: Hypotheses, problem: Any, fit: Posterior) -> Hypothesis:
         """Return a pair as a hypothesis that explains all, but is less likely than one effect."""
-        h = tested(self, fit)
+        h = tested(self, problem, fit)
         return replace(h, likelihood=h.likelihood - 1e4) if len(fit.effects) > 1 else h
 
     monkeypatch.setattr(Hypotheses, "_tested", dearer)
