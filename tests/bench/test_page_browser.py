@@ -114,6 +114,8 @@ def visit(
     wait_for(page, f"({ROWS})(0).length > {len(seen.rows[0]) + 1}")
     seen.rows_again = page.evaluate(ROWS, 0)
     page.keyboard.press("Space")
+    # an emulator that is killed leaves its link, behind which another test's port may come to stand
+    Path(port).unlink()
     emulator.send_signal(signal.SIGKILL)
     status = page.locator("#status")
     status.filter(has_text="unplugged since").wait_for()
