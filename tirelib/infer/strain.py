@@ -188,7 +188,6 @@ class StrainProblem:
         self.values = {**values, **means}
         begin = [float(np.max(c.distance(self.values[c.name], values[c.name]))) for c in self.free]
         self.start = Point(np.array([*begin, 0.0]), tuple(effects), tuple(strengths))
-        self.starts = (self.start, replace(self.start, base=self._of_literature()))
         self.widths = np.array([*(WIDTH[c.name] for c in self.free), STD / UNIT])
         ends = [c.ends(float(np.max(self.values[c.name]))) for c in self.free]
         low, high = np.array([*ends, (-np.inf, np.inf)]).T  # a delay has none
@@ -212,8 +211,9 @@ class StrainProblem:
         further = [effect for effect in catalogue if effect.name not in has]
         self.living, self.dead = living(further, self.data.points, signal)
 
-    def _of_literature(self) -> FloatArray:
-        """Return the base's coordinates, and no delay, of a tire as the literature has it.
+    @property
+    def starts(self) -> tuple[Point, Point]:
+        """The model as it is given, and with the base of a tire as the literature has it.
 
         Numbers that fit the runs well without an effect may lie in another valley than those that
         fit them with it.
@@ -225,7 +225,7 @@ class StrainProblem:
             own = float(np.max(self.values[c.name]))
             if c.name in there and (c.unit or own):  # no factor moves a zero
                 moves[k] = c.distance(own, there[c.name])
-        return moves
+        return self.start, replace(self.start, base=moves)
 
     @property
     def half_angle(self) -> FloatArray:

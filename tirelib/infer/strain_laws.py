@@ -80,12 +80,16 @@ def law_errors(
 
 
 def stiffened(before: State, after: State) -> dict[str, FloatArray]:
-    """Return by how much the stiffness of each part of a tire changes, (n_runs,), log ratio."""
+    """Return by how much the stiffness of each part of a tire changes, (n_runs,), log ratio.
+
+    The change of a sidewall is that of k_v where k_u and k_v both change.
+    """
     out: dict[str, FloatArray] = {}
     for name, part in PARTS.items():
-        change = np.log(getattr(after, name) / getattr(before, name))
-        if np.any(change):
-            out[part] = change
+        old, new = getattr(before, name), getattr(after, name)
+        if np.any(new != old):
+            # a stiffness of zero that stays has not changed
+            out[part] = np.log(np.divide(new, old, out=np.ones_like(old), where=new != old))
     return out
 
 
@@ -112,7 +116,7 @@ def beside(
     part : str
         Part of the tire, as `FIELDS` has it.
     change : shape (n_runs,)
-        Of the stiffness, log ratio.
+        Log ratio of the stiffness after the effect to the one before.
     rows : shape (1, n_runs, n_phi)
         What the effect does.
     present : int

@@ -114,6 +114,11 @@ def test_a_law_of_one_stiffness_is_off_by_what_else_that_part_of_the_tire_is_mad
 def test_a_law_that_makes_nothing_stiffer_has_no_such_error() -> None:
     state = State.of(values_of(TIRE), POINTS, GRID)
     assert stiffened(state, state.but(tension=state.tension + 100.0)) == {}
+    # a sidewall without a tangential stiffness has none to change
+    bare = state.but(k_v=0.0 * state.k_v)
+    assert stiffened(bare, bare.but(tension=state.tension + 100.0)) == {}
+    found = stiffened(bare, bare.but(k_u=0.5 * bare.k_u, k_v=0.5 * bare.k_v))
+    assert found["sidewall"] == pytest.approx(np.full(3, np.log(0.5)))
 
 
 def test_a_run_ahead_changes_no_error_of_the_runs_that_are_measured() -> None:
