@@ -2,8 +2,9 @@
 
     python build/cosim/closed_loop_speed.py hydroplaning antilock_low
 
-Each loop is one of ``make cosim``; it runs twice, in this process, whose CPU time is told. All that
-it finds is compared: numbers relative to the larger of the two, words exactly.
+Each loop is one of ``make cosim``. It runs twice in this process, and the program prints the CPU
+time of both runs. Everything that the two runs find is compared: numbers by their difference
+relative to the larger one, words exactly.
 """
 
 import argparse

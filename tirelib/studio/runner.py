@@ -81,7 +81,8 @@ class _Starter:
         ended, wake = os.pipe()
         os.set_blocking(wake, False)
         signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
-        signal.signal(signal.SIGCHLD, lambda *_: None)  # so that the pipe is told of it
+        # a signal with a handler of Python is written to the pipe; the default one is not
+        signal.signal(signal.SIGCHLD, lambda *_: None)
         rest = b""
         while True:
             ready, _, _ = select.select([0, ended], [], [])

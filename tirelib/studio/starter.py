@@ -14,9 +14,11 @@ from typing import Any
 RUNNER = (sys.executable, "-m", "tirelib.studio.runner")
 """Command of the process that starts jobs."""
 LONGEST_END = 5.0
-"""Time after which the end of a job is no longer waited for, [s]; it takes some milliseconds."""
+"""Longest wait for the end of a job, [s]. A job is killed, which takes some milliseconds: half or
+double of this limit changes nothing but the wait for a system that is stuck."""
 LOST = -9
-"""Exit code of a job whose starter was ended from outside, and so the job with it."""
+"""Exit code of a job that ended because its starter was killed: that of SIGKILL, as `subprocess`
+counts it."""
 
 
 class Starter:
@@ -25,7 +27,7 @@ class Starter:
     Parameters
     ----------
     command : sequence of str
-        Of the process that starts them.
+        Command line of the process that starts the jobs.
     """
 
     def __init__(self, command: Sequence[str] = RUNNER) -> None:

@@ -1,9 +1,9 @@
 """Errors on points that took no part in a fit.
 
 In a sweep, blocks of time are held out, each in turn. Their error is the held-out error of the
-diagnosis, and that of the highest set points is shown beside it. In steady runs, the highest load,
-pressure, camber, temperature and speed are held out; where none of them can be spared, every fourth
-cell of conditions in turn.
+diagnosis; the error on the highest set points is shown as well. In steady runs, the points of the
+highest load, pressure, camber, temperature and speed are held out. Where none of these can be
+spared, every fourth cell of conditions is held out in turn.
 """
 
 from collections.abc import Sequence
