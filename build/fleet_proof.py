@@ -20,13 +20,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from threading import Thread
 
 import psutil
-from distributed import Client, LocalCluster
+from distributed import Client
 from rich.console import Console
 
 ROOT = Path(__file__).parents[1]
@@ -132,18 +131,6 @@ def campaigns(folder: Path, count: int) -> Path:
     return target
 
 
-@contextmanager
-def cluster(workers: int) -> Iterator[Client]:
-    """Yield a client of a local cluster."""
-    with (
-        LocalCluster(
-            n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
-        ) as local,
-        Client(local) as client,
-    ):
-        yield client
-
-
 class Peak(Thread):
     """Watch the memory of this process and of the workers."""
 
@@ -172,7 +159,7 @@ def memory(folder: Path, counts: Sequence[int]) -> None:
     """Peak memory of client with scheduler, and of a worker, over the number of campaigns."""
     for count in counts:
         paths = campaigns(folder, count)
-        with cluster(2) as client:
+        with engine.cluster(None, 2) as client:
             watch = Peak(client)
             watch.start()
             began = time.monotonic()
@@ -208,7 +195,7 @@ def scheduler(folder: Path, counts: Sequence[int]) -> None:
     for count in counts:
         sources = [Source(f"/nowhere/{k:06d}", True) for k in range(count)]
         engine.find_sources = lambda paths, sources=sources: sources
-        with cluster(2) as client:
+        with engine.cluster(None, 2) as client:
             workers_before, before, began = _processor(client), _spent(), time.monotonic()
             counts = _check(folder, folder / f"out-{count}", client)
             wall, own = time.monotonic() - began, _spent() - before
@@ -235,7 +222,7 @@ def workers(folder: Path, count: int) -> None:
     paths = campaigns(folder, count)
     for number in (1, 2):
         out = folder / f"out-{number}-{time.monotonic_ns()}"
-        with cluster(number) as client:
+        with engine.cluster(None, number) as client:
             data = DataSet(str(out))
             data.open()
             recipe = engine.recipe_of("estimate", data, files={"calibration": str(known)})
@@ -255,7 +242,7 @@ def endurance(folder: Path, minutes: float) -> None:
     until, kills, rounds = time.monotonic() + 60.0 * minutes, 0, 0
     while time.monotonic() < until:
         out = folder / f"out-{rounds}"
-        with cluster(2) as client:
+        with engine.cluster(None, 2) as client:
             last = time.monotonic()
 
             def kill(counts: engine.Counts, client: Client = client) -> None:

@@ -8,11 +8,13 @@ import pytest
 
 pytest.importorskip("yaml", reason="PyYAML comes with the extra tirelib[fleet]")
 
+import dask.config
 import yaml
 from distributed.cli.dask_scheduler import main as dask_scheduler
 from distributed.cli.dask_worker import main as dask_worker
 
 from tirelib.cli.fleet import fleet
+from tirelib.fleet.engine import NO_PROFILER
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "howto" / "fleet"
@@ -75,3 +77,13 @@ def test_the_image_installs_the_extra_that_exists() -> None:
     extra = re.search(r"/src\[(\w+)\]", (FOLDER / "Dockerfile").read_text())
     assert extra is not None
     assert f"\n{extra[1]} = [" in (ROOT / "pyproject.toml").read_text()
+
+
+def test_the_image_turns_off_the_profiler_as_a_cluster_of_this_machine_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for pair in re.findall(r"^ENV (DASK_\S+)=(\S+)", (FOLDER / "Dockerfile").read_text(), re.M):
+        monkeypatch.setenv(*pair)
+    found = dask.config.collect_env()
+    for name, value in NO_PROFILER.items():
+        assert dask.config.get(name, config=found) is value

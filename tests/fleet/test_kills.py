@@ -136,6 +136,18 @@ def test_a_killed_client_and_then_the_same_again(
     assert len(set(finished(out))) == len(finished(out)) == COUNT
 
 
+def test_a_worker_keeps_no_call_stacks_of_what_it_did() -> None:
+    """The profiler of Dask would let it grow by the second."""
+
+    def stacks(dask_worker: object) -> tuple[bool, int]:
+        callbacks = dask_worker.periodic_callbacks  # type: ignore[attr-defined]
+        return "profile" in callbacks, len(dask_worker.io_loop.profile)  # type: ignore[attr-defined]
+
+    with engine.cluster(None, 1) as client:
+        (found,) = client.run(stacks).values()
+    assert found == (False, 0)
+
+
 def test_no_scheduler_at_the_address_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engine, "CONNECT", 0.5)
     with (

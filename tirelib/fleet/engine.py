@@ -12,6 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import dask.config
 import pyarrow.dataset as pads
 from distributed import Client, Future, LocalCluster, as_completed
 
@@ -35,6 +36,9 @@ LATEST = 5.0
 """Time after which finished rows are added, however few they are, [s]."""
 CONNECT = 20.0
 """Time in which a scheduler must answer, [s]."""
+NO_PROFILER = {"distributed.worker.profile.enabled": False}
+"""Dask's profiler keeps call stacks of the last 1,000 seconds in each worker, 0.4 MB a second with
+the short tasks of a fleet, and takes part of the processor (``build/fleet_proof.py memory``)."""
 
 
 @dataclass(slots=True)
@@ -75,6 +79,7 @@ def cluster(address: str | None, workers: int | None) -> Iterator[Client]:
     """
     if address is None:
         with (
+            dask.config.set(NO_PROFILER),
             LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
