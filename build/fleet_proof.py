@@ -40,7 +40,7 @@ from tirelib.estimators.calibration_file import write_calibration  # noqa: E402
 from tirelib.estimators.train import train  # noqa: E402
 from tirelib.fleet import engine, work  # noqa: E402
 from tirelib.fleet.dataset import DataSet  # noqa: E402
-from tirelib.fleet.sources import Source  # noqa: E402
+from tirelib.fleet.sources import Source, find_sources  # noqa: E402
 from tirelib.observations import observe  # noqa: E402
 from tirelib.threads import one_thread  # noqa: E402
 
@@ -148,11 +148,11 @@ class Peak(Thread):
             time.sleep(0.5)
 
 
-def _check(paths: Path, out: Path, client: Client, verb=run_verb) -> engine.Counts:
+def _check(sources: list[Source], out: Path, client: Client) -> engine.Counts:
     data = DataSet(str(out))
     data.open()
     recipe = engine.recipe_of("check", data, files={})
-    return engine.run([str(paths)], data, recipe, client, verb)
+    return engine.run(sources, data, recipe, client, run_verb)
 
 
 def memory(folder: Path, counts: Sequence[int]) -> None:
@@ -163,7 +163,7 @@ def memory(folder: Path, counts: Sequence[int]) -> None:
             watch = Peak(client)
             watch.start()
             began = time.monotonic()
-            counts = _check(paths, folder / f"out-{count}", client)
+            counts = _check(find_sources([str(paths)]), folder / f"out-{count}", client)
             wall = time.monotonic() - began
             watch.going = False
         peaks = ", ".join(f"{peak / 2**20:.0f}" for peak in watch.peak)
@@ -194,10 +194,9 @@ def scheduler(folder: Path, counts: Sequence[int]) -> None:
     engine.fingerprint = lambda source: source.url
     for count in counts:
         sources = [Source(f"/nowhere/{k:06d}", True) for k in range(count)]
-        engine.find_sources = lambda paths, sources=sources: sources
         with engine.cluster(None, 2) as client:
             workers_before, before, began = _processor(client), _spent(), time.monotonic()
-            counts = _check(folder, folder / f"out-{count}", client)
+            counts = _check(sources, folder / f"out-{count}", client)
             wall, own = time.monotonic() - began, _spent() - before
             theirs = _processor(client) - workers_before
         SAY(
@@ -226,9 +225,9 @@ def workers(folder: Path, count: int) -> None:
             data = DataSet(str(out))
             data.open()
             recipe = engine.recipe_of("estimate", data, files={"calibration": str(known)})
-            engine.run([str(paths / "000000")], data, recipe, client, run_verb)
+            engine.run(find_sources([str(paths / "000000")]), data, recipe, client, run_verb)
             before, began = _processor(client), time.monotonic()
-            counts = engine.run([str(paths)], data, recipe, client, run_verb)
+            counts = engine.run(find_sources([str(paths)]), data, recipe, client, run_verb)
             wall, spent = time.monotonic() - began, _processor(client) - before
         SAY(
             f"{number} worker(s): {counts.done} done in {wall:.1f} s, {counts.done / wall:.2f} a "
@@ -254,7 +253,7 @@ def endurance(folder: Path, minutes: float) -> None:
             data = DataSet(str(out))
             data.open()
             recipe = engine.recipe_of("check", data, files={})
-            engine.run([str(paths)], data, recipe, client, run_verb, report=kill)
+            engine.run(find_sources([str(paths)]), data, recipe, client, run_verb, report=kill)
         found = data.table("container_metrics")["container_id"].to_pylist()
         rounds += 1
         SAY(

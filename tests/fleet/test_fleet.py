@@ -4,10 +4,12 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+import fsspec
 import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from fsspec import AbstractFileSystem
 
 pytest.importorskip("distributed", reason="the extra tirelib[fleet] is not installed")
 
@@ -31,7 +33,8 @@ def run(
     data.open()
     files = {k: str(options.pop(k)) for k in ("calibration", "model") if k in options}
     recipe = engine.recipe_of(task, data, files=files, options=options.pop("also", ()))  # type: ignore[arg-type]
-    return engine.run([str(p) for p in paths], data, recipe, client, run_verb, **options)  # type: ignore[arg-type]
+    sources = find_sources([str(p) for p in paths])
+    return engine.run(sources, data, recipe, client, run_verb, **options)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
@@ -191,6 +194,36 @@ def test_paths_without_campaigns_and_foreign_folders_are_refused(tmp_path: Path)
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(FormatError, match="not empty and not a data set"):
         DataSet(str(tmp_path)).open()
+
+
+class Locked(AbstractFileSystem):  # type: ignore[misc]
+    """A storage without keys; its errors are of a kind of its own."""
+
+    protocol = "locked"
+
+    def exists(self, path: str, **more: object) -> bool:
+        raise LookupError("unable to locate credentials")
+
+    isdir = exists
+
+
+def test_a_storage_without_keys_is_said() -> None:
+    fsspec.register_implementation("locked", Locked, clobber=True)
+    with pytest.raises(FormatError, match=r"locked://a: cannot be reached .*locate credentials"):
+        find_sources(["locked://a"])
+    with pytest.raises(FormatError, match=r"locked://a: cannot be written .*locate credentials"):
+        DataSet("locked://a").open()
+
+
+@pytest.mark.parametrize("more", ["--nosuch 3", "--quick 'x", "--order few"])
+def test_wrong_options_of_the_verb_are_said_once_before_any_work(
+    more: str, campaigns: Path, tmp_path: Path
+) -> None:
+    command = ["fleet", "calibrate", str(campaigns), "--out", str(tmp_path / "out"), "--with", more]
+    done = CliRunner().invoke(program, command, catch_exceptions=False)
+    assert done.exit_code == 2
+    assert f"--with {more!r}" in done.output
+    assert not (tmp_path / "out").exists()
 
 
 def test_patterns_find_each_once(campaigns: Path) -> None:

@@ -21,6 +21,7 @@ from tirelib.cli.fleet import run_verb
 from tirelib.fleet import engine
 from tirelib.fleet.dataset import DataSet
 from tirelib.fleet.engine import Counts, SchedulerLostError
+from tirelib.fleet.sources import find_sources
 
 COUNT = 6
 PATIENCE = 300.0
@@ -41,7 +42,7 @@ def run(many: Path, out: Path, client: Client, report: object = None) -> Counts:
     data.open()
     recipe = engine.recipe_of("check", data, files={})
     said = report or (lambda counts: None)
-    return engine.run([str(many)], data, recipe, client, run_verb, report=said)  # type: ignore[arg-type]
+    return engine.run(find_sources([str(many)]), data, recipe, client, run_verb, report=said)  # type: ignore[arg-type]
 
 
 def finished(out: Path) -> list[int]:
@@ -52,7 +53,7 @@ def test_a_killed_worker_loses_nothing(many: Path, tmp_path: Path) -> None:
     killed: list[int] = []
 
     def kill(counts: Counts) -> None:
-        if not killed:
+        if counts.done and not killed:
             killed.extend(client.run(os.getpid).values())
             os.kill(killed[0], signal.SIGKILL)
 
@@ -103,7 +104,8 @@ def test_a_killed_scheduler_and_then_the_same_again(
     with scheduler(tmp_path) as (address, process):
 
         def kill(counts: Counts) -> None:
-            process.kill()
+            if counts.done:
+                process.kill()
 
         with engine.cluster(address, None) as first:
             first.wait_for_workers(1, timeout=PATIENCE)

@@ -21,6 +21,7 @@ from tirelib.cli.fleet import run_verb
 from tirelib.fleet import engine
 from tirelib.fleet.dataset import DataSet
 from tirelib.fleet.page import write_fleet_page
+from tirelib.fleet.sources import find_sources
 
 
 @pytest.fixture
@@ -66,7 +67,9 @@ def test_from_bucket_to_bucket(
     data.open()
     for skipped in (0, 1):
         recipe = engine.recipe_of("estimate", data, files={"calibration": str(calibration)})
-        counts = engine.run([f"{bucket}/in"], data, recipe, client, run_verb, delta=True)
+        counts = engine.run(
+            find_sources([f"{bucket}/in"]), data, recipe, client, run_verb, delta=True
+        )
         assert (counts.total, counts.skipped, counts.failed) == (2, skipped, 1), counts.messages
     assert write_fleet_page(data).endswith("fleet/out/index.html")
     fs.get("fleet/out", str(tmp_path / "out"), recursive=True)

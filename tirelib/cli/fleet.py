@@ -128,7 +128,10 @@ def fleet(
     from tirelib.fleet import engine
     from tirelib.fleet.dataset import DataSet
     from tirelib.fleet.page import write_fleet_page
+    from tirelib.fleet.sources import find_sources
 
+    options = _options(task, more)
+    sources = find_sources(paths)
     data = DataSet(str(out))
     data.open()
     files = {"calibration": calibration, "model": model}
@@ -136,7 +139,7 @@ def fleet(
         task,
         data,
         files={name: given for name, given in files.items() if given is not None},
-        options=shlex.split(more),
+        options=options,
         reports=reports,
     )
     console = output()
@@ -147,7 +150,7 @@ def fleet(
             counts = engine.Counts()
             try:
                 engine.run(
-                    paths, data, recipe, client, run_verb, counts=counts, delta=delta, report=show
+                    sources, data, recipe, client, run_verb, counts=counts, delta=delta, report=show
                 )
             except KeyboardInterrupt:
                 stopped = (
@@ -166,6 +169,27 @@ def fleet(
     if stopped:
         click.echo(f"Error: {stopped}", err=True)
     context.exit(1 if counts.failed or stopped else 0)
+
+
+def _options(task: str, more: str) -> list[str]:
+    """Return further options of the verb; refuse what it does not know, once for all campaigns."""
+    from tirelib.cli import program
+    from tirelib.fleet.work import TASKS as VERBS
+
+    try:
+        options = shlex.split(more)
+        verb: Any = program
+        for word in VERBS[task]:
+            verb = verb.get_command(click.Context(verb), word)
+        context = click.Context(verb)
+        given, *_ = verb.make_parser(context).parse_args(list(options))
+        for option in verb.params:
+            if isinstance(option, click.Option) and option.name in given:
+                option.type_cast_value(context, given[option.name])
+    except (ValueError, click.UsageError) as error:
+        said = error.format_message() if isinstance(error, click.UsageError) else str(error)
+        raise click.UsageError(f"--with {more!r}: {said}") from None
+    return options
 
 
 @contextmanager

@@ -75,9 +75,9 @@ class DataSet:
                     "choose another --out"
                 )
             self.write(json.dumps({"format": FORMAT}).encode(), HEAD)
-        except (OSError, ValueError) as error:
-            if isinstance(error, FormatError):
-                raise
+        except FormatError:
+            raise
+        except Exception as error:  # each kind of storage has errors of its own
             raise FormatError(
                 f"{self.url}: cannot be written ({error}); choose another --out, or check its keys"
             ) from None

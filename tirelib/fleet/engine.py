@@ -19,7 +19,7 @@ from distributed import Client, Future, LocalCluster, as_completed
 from tirelib import __version__
 from tirelib.errors import FormatError, ParameterError
 from tirelib.fleet.dataset import DataSet, Rows
-from tirelib.fleet.sources import Source, find_sources, fingerprint
+from tirelib.fleet.sources import Source, fingerprint
 from tirelib.fleet.tables import PARTITION
 from tirelib.fleet.work import NEEDS, TASKS, WRITES, Outcome, Recipe, Verb, failed, process
 
@@ -207,7 +207,7 @@ def _index(other: DataSet, name: str) -> bytes:
 
 
 def run(
-    paths: Sequence[str],
+    sources: Sequence[Source],
     data: DataSet,
     recipe: Recipe,
     client: Client,
@@ -217,11 +217,11 @@ def run(
     delta: bool = False,
     report: Callable[[Counts], None] = lambda counts: None,
 ) -> Counts:
-    """Run a task over every source below the paths that is not finished.
+    """Run a task over every source that is not finished.
 
     Parameters
     ----------
-    paths : sequence of str
+    sources : sequence of Source
     data : DataSet
         Opened.
     recipe : Recipe
@@ -233,7 +233,7 @@ def run(
     delta : bool
         Keep a Delta log beside the Parquet files; a data set that has one keeps it in any case.
     report : callable
-        Called with the counts after each result.
+        Called with the counts when the first tasks are handed out, and after results.
 
     Raises
     ------
@@ -241,7 +241,6 @@ def run(
         If the scheduler goes away.
     """
     counts = Counts() if counts is None else counts
-    sources = find_sources(paths)
     counts.total = len(sources)
     delta = delta or data.has("container_metrics", "_delta_log")
     data.repair(recipe.task)
@@ -253,6 +252,7 @@ def run(
     room = max(FEWEST_AHEAD, AHEAD * max(sum(client.nthreads().values()), 1))
     try:
         _submit(client, waiting, given, done, room, recipe, data.url, verb)
+        report(counts)
         while given:
             for future in done.next_batch():
                 source, mark = given.pop(future)
@@ -264,7 +264,6 @@ def run(
     finally:
         client.cancel(list(given), asynchronous=False, force=True) if _alive(client) else None
         book.close()
-    report(counts)
     return counts
 
 

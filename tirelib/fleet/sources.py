@@ -43,7 +43,7 @@ def find_sources(paths: Sequence[str]) -> list[Source]:
     for path in paths:
         try:
             below = list(_below(path))
-        except (OSError, ValueError, ImportError) as error:
+        except Exception as error:  # each kind of storage has errors of its own
             problems.append(f"{path}: cannot be reached ({error}); check the address and its keys")
             continue
         if not below:
