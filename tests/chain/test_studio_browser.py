@@ -404,6 +404,26 @@ def test_what_is_dropped_is_checked_or_imported(browser: Any, tmp_path: Path) ->
     assert runs[1].rig["Fz"] == pytest.approx(2000.0)
 
 
+def test_what_was_measured_is_seen_before_any_model_is_fitted(browser: Any, tmp_path: Path) -> None:
+    with closing(Served(tmp_path)) as served:
+        until(lambda: served.server.started)
+        served.hold.touch()  # the fit does not end
+        name = served.do(do="open", path=str(served.measured))[1]["campaign"]
+        page = page_at(browser, f"http://{served.host}/?token={TOKEN}")
+        page.evaluate(f"location.hash = '#/see/{name}'")
+        page.get_by_role("heading", name="What was measured [microstrain]").wait_for()
+        page.get_by_text("fit the base model: weighted residual").wait_for()
+        table = saved(page, page.locator(".heat").locator("xpath=.."))
+        page.locator("canvas").first.press("ArrowUp")
+        curve = saved(page, page.locator(".plot").first)
+        models = served.campaign(name)["models"]
+        page.context.close()
+    assert [one["ready"] for one in models] == [False]
+    cells = [[float(x) for x in column] for column in list(table.values())[1:]]
+    assert cells == [[0.0, 10.0], [1.0, 11.0], [2.0, 12.0]]
+    assert [float(x) for x in curve["measured [microstrain]"]] == [10.0, 11.0, 12.0]
+
+
 def test_a_diagnosis_that_fails_says_what_can_be_done_next(browser: Any, tmp_path: Path) -> None:
     with closing(Served(tmp_path)) as served:
         until(lambda: served.server.started)

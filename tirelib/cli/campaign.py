@@ -13,10 +13,10 @@ from rich.table import Table
 
 from tirelib.campaign.problem import Problem
 from tirelib.campaign.read import Campaign, read_campaign
-from tirelib.cli.common import NEW_FOLDER
+from tirelib.cli.common import NEW_FILE, NEW_FOLDER
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.errors import FormatError
+from tirelib.errors import CalibrationError, FormatError
 
 CHECK_FORMAT = "tirelib-campaign-check/1"
 SHOW_FORMAT = "tirelib-campaign-show/1"
@@ -127,14 +127,23 @@ Examples:
     type=NEW_FOLDER,
     help="Folder for the overview plot. Default: show-NAME.",
 )
+@click.option(
+    "--data",
+    "data_file",
+    metavar="FILE.npz",
+    type=NEW_FILE,
+    help="File for what was measured as arrays: waveforms over the wheel angle, or forces.",
+)
 @json_option("header and runs")
 @progress_options
-def show(folder: Path, out: Path | None, json_file: Path | None) -> None:
+def show(folder: Path, out: Path | None, data_file: Path | None, json_file: Path | None) -> None:
     """Show header, runs with set points and measured means, and an overview plot of DIR."""
     from tirelib.campaign.overview import RunRow, representative_plans, run_row
     from tirelib.report.campaign_overview import overview_figure, save_figure
 
     data = read_campaign(folder)
+    if data_file is not None:
+        _write_measured(data, data_file)
     chosen = {plan.run for plan in representative_plans(data.plans)}
     rows: list[RunRow] = []
     shown = []
@@ -152,6 +161,16 @@ def show(folder: Path, out: Path | None, json_file: Path | None) -> None:
     if json_file is not None:
         _write_json(json_file, _show_document(data, rows, picture))
     console.print(f"overview plot: {picture}", markup=False, soft_wrap=True)
+
+
+def _write_measured(data: Campaign, file: Path) -> None:
+    """Write what was measured, or say why there is nothing to be drawn."""
+    from tirelib.compare.plot_data import measured_data, write_plot_data
+
+    try:
+        write_plot_data(file, measured_data(data))
+    except CalibrationError as error:
+        click.echo(f"Warning: {file} is not written: {error}", err=True)
 
 
 def _print_header(console: Console, data: Campaign) -> None:

@@ -1,5 +1,7 @@
 """What the plots of a comparison are drawn from, and the traces of effects, as arrays.
 
+What was measured is known before any model: it has the same arrays without those of a model.
+
 A trace is the difference (model less measured) that an effect would leave if the measured tire had
 it and the model did not: what it changes at its strength, less what the base model's numbers, the
 delay of the gages and the set points could take up, with the sign turned. It is of first order in
@@ -18,12 +20,13 @@ from tirelib.compare.force_curves import set_point_levels
 from tirelib.compare.force_model import force_model_of
 from tirelib.compare.forces import ForceComparison, usable_points
 from tirelib.compare.model import Model
+from tirelib.compare.runs import Chosen, choose
 from tirelib.compare.strain import Comparison
 from tirelib.documents import new_file
 from tirelib.effects import Effect
-from tirelib.errors import ParameterError, TirelibError
+from tirelib.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.identify.delay import by_delay
-from tirelib.identify.force_data import force_data
+from tirelib.identify.force_data import FORCES, ForceData, force_data
 from tirelib.identify.force_points import force_points, set_points
 from tirelib.identify.random_effects import scales, whitening_of
 from tirelib.identify.span import span
@@ -34,7 +37,7 @@ from tirelib.model.state import Operating
 from tirelib.parameters import TireFile
 from tirelib.quantities import QUANTITIES
 from tirelib.signal import LowPass
-from tirelib.waveforms import GRID
+from tirelib.waveforms import GRID, measure_waveforms
 
 FORMAT = "tirelib-plot-data/1"
 CONDITIONS = ("pressure", "speed", "slip_angle", "camber", "slip_ratio")
@@ -99,6 +102,35 @@ def plot_data(
     return data
 
 
+def measured_data(campaign: Campaign) -> dict[str, Any]:
+    """Return what was measured, as `plot_data` does without a model's arrays.
+
+    Parameters
+    ----------
+    campaign : Campaign
+
+    Returns
+    -------
+    Of strain where the campaign declares gages, else of the first force that was measured.
+
+    Raises
+    ------
+    CalibrationError
+        If no run holds a waveform of strain, or of a campaign without gages a force over slip.
+    """
+    if campaign.header.gage_lateral:
+        return _runs(choose(measure_waveforms(campaign)))
+    points = force_points(force_data(campaign)).data
+    for name in FORCES:
+        known = points.take(np.isfinite(getattr(points, name)))
+        if len(known):
+            return _points(known, name) | {"measured": getattr(known, name)}
+    raise CalibrationError(
+        f"{campaign.header.name}: no run holds {', '.join(FORCES)} with slip angle and load; "
+        "record a force"
+    )
+
+
 def write_plot_data(path: Path, data: Mapping[str, Any]) -> None:
     """Write the arrays as one .npz file.
 
@@ -111,32 +143,39 @@ def write_plot_data(path: Path, data: Mapping[str, Any]) -> None:
         np.savez(stream, **data)
 
 
-def _strain(found: Comparison) -> dict[str, Any]:
-    waves, counted, c = found.chosen.waves, found.chosen.straight, found.chosen.waves.conditions
-    white = np.full(found.difference.shape, np.nan)
-    if found.error.whiten is not None:
-        white[counted] = -found.error.whiten(found.error.rest)
-    lateral = [1e3 * waves.header.gage_lateral[g] for g in found.chosen.gages]
+def _runs(chosen: Chosen) -> dict[str, Any]:
+    """Return the runs, their conditions and their strain as measured."""
+    waves, c = chosen.waves, chosen.waves.conditions
+    lateral = [1e3 * waves.header.gage_lateral[g] for g in chosen.gages]
     return {
         "format": np.array(FORMAT),
         "quantity": np.array("strain"),
         "angle": np.rad2deg(GRID),
-        "run": found.run,
-        "counted": counted,
+        "run": waves.run,
+        "counted": chosen.straight,
         "order": waves.start,
         "load": c["Fz"],
         **{name: QUANTITIES[name].told(c[name]) for name in CONDITIONS},
         "level_load": set_points(c["Fz"]),
         "level_pressure": set_points(c["pressure"]),
         "level_speed": set_points(np.abs(c["speed"])),
-        "edges": np.rad2deg(found.prediction.edges),
         "gages": np.array(lateral),
-        "measured": 1e6 * found.chosen.strain,
+        "measured": 1e6 * chosen.strain,
+        "measured_by_gage": 1e6 * waves.strain[:, chosen.gages],
+    }
+
+
+def _strain(found: Comparison) -> dict[str, Any]:
+    counted = found.chosen.straight
+    white = np.full(found.difference.shape, np.nan)
+    if found.error.whiten is not None:
+        white[counted] = -found.error.whiten(found.error.rest)
+    return _runs(found.chosen) | {
+        "edges": np.rad2deg(found.prediction.edges),
         "model": 1e6 * found.prediction.strain,
         "difference": 1e6 * found.difference,
         "white": white,
         "noise": np.array(1e6 * found.noise.std),
-        "measured_by_gage": 1e6 * waves.strain[:, found.chosen.gages],
         "by_gage": 1e6 * found.by_gage,
     }
 
@@ -193,18 +232,23 @@ def _linear(model: Model, at: Operating, low_pass: LowPass) -> Solved:
     return found.waveform, found.waveform_slopes, planted
 
 
-def _forces(found: ForceComparison) -> dict[str, Any]:
-    data = found.data
+def _points(data: ForceData, quantity: str) -> dict[str, Any]:
+    """Return points of a force and their conditions."""
     return {
         "format": np.array(FORMAT),
-        "quantity": np.array(found.quantity),
-        "run": found.run,
+        "quantity": np.array(quantity),
+        "run": data.block,
         "order": data.time,
         **{
             name: QUANTITIES[name].told(getattr(data, name))
             for name in ("load", "temperature", *CONDITIONS)
         },
         **{f"level_{name}": number for name, number in set_point_levels(data).items()},
+    }
+
+
+def _forces(found: ForceComparison) -> dict[str, Any]:
+    return _points(found.data, found.quantity) | {
         "measured": found.measured,
         "model": found.predicted,
         "difference": found.difference,

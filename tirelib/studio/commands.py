@@ -112,7 +112,7 @@ KINDS: Mapping[str, Kind] = {
         "read the runs",
         lambda o, out: [
             *("campaign", "show", o["campaign"], "--json", f"{out}/show.json"),
-            *("--out", f"{out}/overview"),
+            *("--out", f"{out}/overview", "--data", f"{out}/measured.npz"),
         ],
         ("show.json",),
     ),

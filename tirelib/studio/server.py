@@ -147,9 +147,12 @@ class Studio:
 
     async def _arrays(self, request: Request) -> Response:
         asked = request.query_params
-        model = self.desk.session.campaign(asked.get("campaign", "")).model(asked.get("model", ""))
-        name = _one(asked, "name", ARRAYS)
-        file = model.document(f"{name}.npz", _one(asked, "quantity", QUANTITIES))
+        opened = self.desk.session.campaign(asked.get("campaign", ""))
+        if asked.get("name") == "measured":
+            file = opened.place / "measured.npz"
+        else:
+            name, quantity = _one(asked, "name", ARRAYS), _one(asked, "quantity", QUANTITIES)
+            file = opened.model(asked.get("model", "")).document(f"{name}.npz", quantity)
         data = await asyncio.to_thread(packed, file)
         return Response(data, media_type="application/octet-stream")
 

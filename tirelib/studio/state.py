@@ -53,6 +53,7 @@ def campaign(desk: Desk, opened: Opened) -> dict[str, Any]:
         "check": read_document(opened.place / "check.json"),
         "stale": bool(told_of.get("stale")),
         "shown": _stamp(opened.place / "show.json"),
+        "measured": _stamp(opened.place / "measured.npz"),
         "models": [_model(model, quantity) for model in models],
         "jobs": [
             _job(desk, job) for job in _last(desk) if job.subject.get("campaign") == opened.name

@@ -113,6 +113,27 @@ def test_show_prints_header_runs_and_the_path_of_the_picture(write: Write, tmp_p
     assert "…" not in result.stdout
 
 
+def test_show_writes_what_was_measured_as_arrays(write: Write, tmp_path: Path) -> None:
+    file = tmp_path / "measured.npz"
+    result = call("show", write(), "--out", tmp_path / "o", "--data", file)
+    assert result.exit_code == 0, result.output
+    with np.load(file) as data:
+        assert data["measured"].shape == (data["run"].size, data["angle"].size)
+        assert 100.0 < np.ptp(data["measured"], axis=1).min() < 1e5  # in microstrain
+
+
+def test_show_says_why_there_is_nothing_to_draw(
+    write: Write, sound_runs: tuple[Run, ...], tmp_path: Path
+) -> None:
+    file = tmp_path / "measured.npz"
+    bare = [replace(run, strain=None, trigger=None) for run in sound_runs]
+    result = call("show", write(bare), "--out", tmp_path / "o", "--data", file)
+    assert result.exit_code == 0, result.output
+    assert f"{file} is not written: " in result.stderr
+    assert "holds no strain" in result.stderr
+    assert not file.exists()
+
+
 def test_show_writes_set_points_and_means_in_field_units(write: Write, tmp_path: Path) -> None:
     call("show", write(), "--out", tmp_path / "o", "--json", tmp_path / "show.json")
     document = json.loads((tmp_path / "show.json").read_text())

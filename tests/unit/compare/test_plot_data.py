@@ -8,20 +8,22 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from tests.synthetic import synthetic_run, write
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
 from tests.unit.force_campaigns import brush_file, steady_runs, write_forces
 from tests.unit.identify.model_waves import TIRE
-from tirelib.campaign import Campaign, Run
+from tirelib.campaign import Campaign, Run, read_campaign
 from tirelib.compare.forces import compare_forces
 from tirelib.compare.model import model_of
-from tirelib.compare.plot_data import plot_data, write_plot_data
+from tirelib.compare.plot_data import measured_data, plot_data, write_plot_data
 from tirelib.compare.strain import compare_strain
 from tirelib.effects import CATALOGUE
-from tirelib.errors import ParameterError
+from tirelib.errors import CalibrationError, ParameterError
 from tirelib.identify.delay import by_delay
 from tirelib.model.base import coordinates, operating_points
 from tirelib.model.solution import by_values, solved
 from tirelib.parameters import Number
+from tirelib.waveforms import measure_waveforms
 
 
 def like(trace: Any, rest: Any) -> float:
@@ -67,6 +69,40 @@ def test_the_trace_of_a_brush_effect_looks_like_what_is_left(tmp_path: Path) -> 
     found_like = like(data["trace_friction_load"], data["difference"])
     assert found_like > 0.5  # of first order: the fit has moved stiffness and friction far
     assert abs(like(data["trace_conicity"], data["difference"])) < 0.5 * found_like
+
+
+def test_what_was_measured_is_the_same_before_and_after_a_model(tmp_path: Path) -> None:
+    campaign = write_forces(tmp_path / "steady", steady_runs(slope=0.25), "steady")
+    before = measured_data(campaign)
+    found = compare_forces(campaign, brush_file(campaign), "Fy")
+    after = plot_data(found, campaign, brush_file(campaign), [], CATALOGUE)
+    assert set(after) - set(before) == {"model", "difference", "white", "noise"}
+    for name in before:
+        np.testing.assert_array_equal(before[name], after[name])
+
+
+def test_what_was_measured_of_strain_is_the_same_before_and_after_a_model(tmp_path: Path) -> None:
+    runs = [synthetic_run(k, load=load) for k, load in enumerate((2500.0, 4000.0, 5500.0))]
+    campaign = read_campaign(write(tmp_path / "straight", runs))
+    file = model_file()
+    found = compare_strain(measure_waveforms(campaign), model_of(file))
+    before, after = measured_data(campaign), plot_data(found, campaign, file, [], CATALOGUE)
+    assert set(after) - set(before) == {
+        *("edges", "model", "difference", "white", "noise", "by_gage")
+    }
+    for name in before:
+        np.testing.assert_array_equal(before[name], after[name])
+    assert before["measured"].shape == (len(found.run), before["angle"].size)
+
+
+def test_a_campaign_without_forces_and_gages_has_nothing_to_draw(tmp_path: Path) -> None:
+    def bare() -> Iterator[Run]:
+        for run in steady_runs(repeats=1):
+            kept = {name: x for name, x in run.rig.items() if name not in ("Fx", "Fy", "Mz")}
+            yield replace(run, rig=kept)
+
+    with pytest.raises(CalibrationError, match="record a force"):
+        measured_data(write_forces(tmp_path / "bare", bare(), "bare"))
 
 
 def test_an_unknown_effect_is_refused() -> None:

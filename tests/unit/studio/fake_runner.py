@@ -1,6 +1,6 @@
 """`tirelib.studio.runner` whose jobs write at once what a command would write.
 
-While the file of the environment variable HOLD exists, `add` goes on; every command line is noted
+While the file of the environment variable HOLD exists, fits go on; every command line is noted
 in the file of the environment variable SAID.
 """
 
@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from tirelib.studio import runner
 
@@ -57,7 +58,7 @@ def work(words: Sequence[str]) -> None:
         label = f"error {9 - step}"
         told = {"progress": "fitting", "done": step, "total": None, "label": label}
         sys.stderr.write(json.dumps(told) + "\n")
-        if verb != "add" or not Path(os.environ["HOLD"]).exists():
+        if verb not in ("add", "identify") or not Path(os.environ["HOLD"]).exists():
             break
         time.sleep(0.02)
     if "sidewall_pressure" in words or (verb == "diagnose" and "Fy" in words):
@@ -65,12 +66,26 @@ def work(words: Sequence[str]) -> None:
         sys.exit(2)
     if target := value(words, "--json"):
         target.write_text(json.dumps(WRITES.get(verb, {})))
-    if (target := value(words, "--data")) and verb == "compare":
+    if (target := value(words, "--data")) and verb in ("compare", "show"):
         import numpy as np  # most commands need it not
 
-        np.savez(target, angle=np.arange(3.0), quantity=np.array("strain"))
+        arrays = {"angle": np.arange(3.0), "quantity": np.array("strain")}
+        np.savez(target, **(arrays | _measured(arrays["angle"]) if verb == "show" else arrays))
     if (target := value(words, "--out")) and target.suffix == ".toml":
         target.write_text("model = 1\n")
+
+
+def _measured(angle: Any) -> dict[str, Any]:
+    """Return two runs as `tirelib campaign show --data` does."""
+    run = angle[:2]
+    conditions = ("load", "pressure", "speed", "slip_angle", "camber", "slip_ratio")
+    return {
+        **dict.fromkeys(("run", "order", "counted", *conditions), 1.0 + run),
+        **{f"level_{name}": run for name in conditions[:3]},
+        "gages": angle[:1],
+        "measured": angle + 10.0 * run[:, None],
+        "measured_by_gage": angle + 10.0 * run[:, None, None],
+    }
 
 
 if __name__ == "__main__":

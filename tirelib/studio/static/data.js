@@ -74,6 +74,8 @@ export function nameOf(model) {
 // Jobs of the campaign or of none that wait or run.
 export const active = () => [...(app.campaign?.jobs || []), ...(app.home?.jobs || [])]
   .filter((job) => ["waiting", "running"].includes(job.state));
+// What a job says of its last step; while a fit runs, its error is weighted otherwise than the error of a model.
+export const labelOf = (at) => at?.label.replace(/^error /, "weighted residual ");
 export const progressOf = (number) => app.running.find((one) => one.job === number);
 
 // The last job of a kind on what is looked at, if it has failed or was ended: the user goes on without its result.
@@ -112,6 +114,13 @@ export function arraysOf(model, name, quantity = app.campaign.quantity) {
     const query = new URLSearchParams(about(model, quantity, name));
     return unpack(await (await answer(await fetch(`/arrays?${query}`))).arrayBuffer());
   });
+}
+
+// What was measured, which is there before any model.
+export function measured() {
+  const c = app.campaign;
+  if (!c?.measured) return Promise.resolve(null);
+  return once(`${c.campaign}/measured/${c.measured}`, async () => unpack(await (await answer(await fetch(`/arrays?${new URLSearchParams({ campaign: c.campaign, name: "measured" })}`))).arrayBuffer()));
 }
 
 function unpack(buffer) {

@@ -3,7 +3,7 @@ import { fill, h, number, tall } from "./dom.js";
 
 const BLUE_RED = [[33, 102, 172], [146, 197, 222], null, [244, 165, 130], [178, 24, 43]];
 const CIVIDIS = [[0, 32, 77], [67, 78, 108], [124, 123, 120], [187, 175, 113], [255, 234, 70]];
-const BOTTOM = 36, TOP = 6, RIGHT = 62;
+const BOTTOM = 36, TOP = 6;
 
 function ramp(colors, zero) {
   const stops = colors.map((color) => color || zero);
@@ -33,7 +33,7 @@ export class Heat {
     this.canvas = h("canvas", { tabindex: "0", role: "application", "aria-label": label });
     this.tip = h("div", { class: "tip", "aria-live": "polite" });
     this.element = h("div", { class: "heat" }, this.canvas, this.tip);
-    this.height = tall() * height; this.left = 90; this.choose = choose; this.hover = hover; this.brush = brush;
+    this.base = height; this.left = 90; this.choose = choose; this.hover = hover; this.brush = brush;
     this.at = { row: 0, column: 0 }; this.range = null; this.colors = "diverging";
     this.canvas.addEventListener("pointermove", (event) => this.moved(event));
     this.canvas.addEventListener("pointerdown", (event) => this.pressed(event));
@@ -42,6 +42,8 @@ export class Heat {
     this.observer = new ResizeObserver(() => this.draw());
     this.observer.observe(this.element);
   }
+
+  get height() { return this.fixed || tall() * this.base; }
 
   show(map) {
     this.map = map;
@@ -85,6 +87,7 @@ export class Heat {
     const g = this.canvas.getContext("2d");
     g.scale(ratio, ratio);
     g.font = `${width > 1400 ? 16 : 12}px system-ui, sans-serif`;
+    const RIGHT = this.right = width > 1400 ? 82 : 62;
     const LEFT = this.left = 14 + Math.min(0.4 * width, Math.max(40, ...map.rows.map((row) => (row.tick ? g.measureText(row.tick).width : 0))));
     const w = width - LEFT - RIGHT, t = height - TOP - BOTTOM, n = map.rows.length;
     this.box = { w, t };

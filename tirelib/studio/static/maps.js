@@ -43,7 +43,7 @@ export function strainRows(data, by, name) {
     const mark = by === "order" ? `run ${data.run[i]}` : lead.level[i];
     const tick = mark === last ? "" : by === "order" ? mark : `${number(lead.centres.get(lead.level[i]), 3)} ${CONDITIONS.find(([k]) => k === by)[2]}`;
     last = mark;
-    return { index: i, label: runWords(data, i), tick, values: sliced(data, name, i), edges: [data.edges[2 * i], data.edges[2 * i + 1]] };
+    return { index: i, label: runWords(data, i), tick, values: sliced(data, name, i), edges: data.edges && [data.edges[2 * i], data.edges[2 * i + 1]] };
   });
 }
 

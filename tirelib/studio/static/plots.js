@@ -16,13 +16,15 @@ const axis = (label, extra = {}) => ({
 // series: [{name, values, color, dash, points, width, fill}], bands: [[upper, lower, color]]
 export class Plot {
   constructor(name, { height = 210, select = null, points = false, chosen = null } = {}) {
-    this.name = name; this.height = tall() * height; this.select = select; this.points = points; this.chosen = chosen;
+    this.name = name; this.base = height; this.select = select; this.points = points; this.chosen = chosen;
     this.head = h("span");
     this.place = h("div");
     this.legend = h("div", { class: "legend" });
     this.element = h("div", { class: "plot" }, h("div", { class: "title" }, this.head, csvButton(name, () => this.columns())), this.place, this.legend);
     live.add(this);
   }
+
+  get height() { return this.fixed || tall() * this.base; }
 
   columns() {
     if (!this.told) return [];
@@ -42,6 +44,7 @@ export class Plot {
     this.plot?.destroy();
     fill(this.legend, this.told.series.filter((one) => !one.quiet).map((one) => { const mark = h("i", { class: one.points ? "dot" : one.dash ? "dash" : "" }); mark.style.borderColor = color(one.color); return h("span", {}, mark, one.points ? `${one.hollow ? "○" : "●"} ` : "", one.name); }));
     const { told } = this;
+    this.made = large();
     this.plot = new uPlot({
       width: Math.max(200, this.place.clientWidth || 500), height: this.height, legend: { show: false },
       cursor: { drag: { x: Boolean(this.select), y: false, setScale: false }, points: { show: !this.points }, dataIdx: undefined },
@@ -64,7 +67,7 @@ export class Plot {
     }, data, this.place);
   }
 
-  fit() { if (this.plot && this.place.clientWidth) this.plot.setSize({ width: this.place.clientWidth, height: this.height }); }
+  fit() { if (this.plot && this.made !== large()) this.renew(); else if (this.plot && this.place.clientWidth) this.plot.setSize({ width: this.place.clientWidth, height: this.height }); }
   renew() { if (this.plot) this.make([this.told.x.values, ...this.told.series.map((one) => one.values)]); }
   remove() { live.delete(this); this.plot?.destroy(); }
 }

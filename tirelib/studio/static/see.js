@@ -1,12 +1,14 @@
 // Step 2: where the model fails: a map of what is left, the chosen run, and any number over any condition.
-import { active, app, arraysOf, current, documentOf, progressOf, VERDICTS, wish } from "./data.js";
+import { active, app, arraysOf, current, documentOf, labelOf, measured, progressOf, VERDICTS, wish } from "./data.js";
 import { choose, csvButton, fill, h, number, unitName } from "./dom.js";
 import { Heat, limitOf } from "./heat.js";
 import { Plot } from "./plots.js";
 import { CONDITIONS, forceRows, isStrain, mean, niceTicks, rms, runWords, share, sliced, slipOf, strainRows, unitOf, varying, BINS } from "./maps.js";
 
 const TICKS = [-180, -120, -60, 0, 60, 120, 180];
-const VALUES = { difference: "model less measured", white: "whitened residual" };
+const VALUES = { difference: "model less measured", white: "whitened residual", measured: "measured" };
+// Which of them are known: before the first fit only what was measured.
+const known = (data) => Object.keys(VALUES).filter((key) => data[key]?.some(Number.isFinite));
 
 // The map with its controls and the plots of the chosen row; the next step shows the same with a trace.
 export class Field {
@@ -24,9 +26,20 @@ export class Field {
     this.model = model;
     const key = `${app.campaign.campaign}/${model.number}/${app.campaign.quantity}/${model.documents[`${app.campaign.quantity}/plots.npz`]}`;
     if (key === this.key) return Boolean(this.data);
-    const data = await arraysOf(model, "plots");
+    return this.take(key, await arraysOf(model, "plots"));
+  }
+
+  // What was measured, while there is no model yet.
+  async loadMeasured() {
+    const key = `${app.campaign.campaign}/measured/${app.campaign.measured}`;
+    return key === this.key ? Boolean(this.data) : this.take(key, await measured());
+  }
+
+  take(key, data) {
     if (!data) return false;
+    const bare = this.data && !this.data.difference; // what was looked at before had no model
     this.key = key; this.data = data; this.trace = null;
+    if (bare || !known(data).includes(this.value)) [this.value] = known(data);
     const orders = this.orders(data).map(([k]) => k);
     if (!orders.includes(this.by)) [this.by] = orders;
     this.build();
@@ -58,10 +71,10 @@ export class Field {
     this.limit = limitOf(data[this.value]);
     this.heat.at.row = this.row;
     this.heat.show({ columns: this.columns, rows: this.rows, x: this.x, unit: this.unit, limit: this.limit, say: (r, c) => this.cell(r, c) });
-    const known = data.white.some(Number.isFinite);
-    fill(this.controls, h("h2", {}, this.trace ? `What ${this.trace.name} would leave [${this.unit}]` : `What is left [${this.unit}]`), h("span", { class: "room" }),
+    const title = this.trace ? `What ${this.trace.name} would leave` : this.value === "measured" ? "What was measured" : "What is left";
+    fill(this.controls, h("h2", {}, `${title} [${this.unit}]`), h("span", { class: "room" }),
       choose(this.orders(data), this.by, (by) => { this.by = by; this.build(); this.detail(); }, "rows by"),
-      choose(Object.entries(VALUES).filter(([k]) => k !== "white" || known), this.value, (v) => { this.value = v; this.build(); this.detail(); }, "values"),
+      choose(known(data).map((k) => [k, VALUES[k]]), this.value, (v) => { this.value = v; this.build(); this.detail(); }, "values"),
       choose([["diverging", "blue and red"], ["cividis", "dark to light"]], this.heat.colors, (c) => { this.heat.colors = c; this.heat.image = null; this.heat.draw(); }, "colours"),
       csvButton("map", () => this.heat.columns(strain ? 0 : 0.5)));
     this.stats();
@@ -74,7 +87,7 @@ export class Field {
 
   stats() {
     const { data, range } = this;
-    if (!range) { this.said.textContent = `${isStrain(data) ? "The thin lines are the edges of the model's contact. " : "Where the map is grey, nothing was measured. "}Drag over the map or the plot (at the keyboard: Shift with the arrow keys) to see what share of the squared residual a range holds.`; return; }
+    if (!range) { this.said.textContent = `${isStrain(data) ? (data.edges ? "The thin lines are the edges of the model's contact. " : "") : "Where the map is grey, nothing was measured. "}Drag over the map or the plot (at the keyboard: Shift with the arrow keys) to see the rms of a range and its share of the squares.`; return; }
     const at = (k) => this.x.low + ((k + 0.5) * (this.x.high - this.x.low)) / this.columns;
     const found = share(data, this.value, this.rows, (k) => at(k) >= range[0] && at(k) <= range[1], data.counted);
     this.said.textContent = `From ${number(range[0])} to ${number(range[1])}: rms ${number(found.rms)} ${this.unit}, ${number(100 * found.share, 3)} % of the squares, ${found.count} values.`;
@@ -99,14 +112,37 @@ export class See {
     this.side = h("div", {}, h("div", { class: "card" }, this.tools, this.field.curve.element), h("div", { class: "card" }, this.tools2, this.field.rest.element));
     this.body = h("div", { class: "two wide-left" }, this.field.element, this.side);
     this.element = h("div", {}, this.head, this.body);
+    this.resized = () => this.arrange();
+    window.addEventListener("resize", this.resized);
   }
 
-  leave() { this.field.curve.remove(); this.field.rest.remove(); }
+  leave() { window.removeEventListener("resize", this.resized); this.field.curve.remove(); this.field.rest.remove(); }
+
+  // The map and the two plots fill the window, and are never smaller than on a small one.
+  arrange() {
+    const { heat, curve, rest, element } = this.field;
+    if (this.body.hidden || !this.body.clientWidth) return;
+    const beside = this.side.offsetLeft > element.offsetLeft; // on a narrow window they stand below each other
+    const free = beside ? window.innerHeight - document.querySelector("footer").offsetHeight - this.body.getBoundingClientRect().top - window.scrollY - 36 : 0;
+    const drawn = heat.canvas.clientHeight, plots = curve.place.clientHeight + rest.place.clientHeight;
+    heat.fixed = Math.max(400, free - (element.clientHeight - drawn));
+    const other = free - (this.side.clientHeight - plots);
+    curve.fixed = Math.max(210, 0.52 * other); rest.fixed = Math.max(190, 0.48 * other);
+    heat.draw(); curve.fit(); rest.fit();
+  }
 
   async update() {
     const model = current();
     const compared = model && (await documentOf(model, "comparison").catch(() => null));
-    if (!compared || !(await this.field.load(model).catch(() => false))) { this.body.hidden = true; wait(this.head); return; }
+    const before = this.fitted;
+    this.fitted = Boolean(compared && (await this.field.load(model).catch(() => false)));
+    if (this.fitted && before === false) this.y = "difference";
+    if (!this.fitted) {
+      wait(this.head);
+      this.body.hidden = !app.campaign || !(await this.field.loadMeasured().catch(() => false));
+      if (!this.body.hidden) this.plots();
+      return;
+    }
     this.body.hidden = false;
     const c = compared, said = [...c.statements, ...c.messages];
     fill(this.head, h("div", { class: "row" },
@@ -119,7 +155,7 @@ export class See {
     this.plots();
   }
 
-  progress() { if (this.body.hidden) wait(this.head); }
+  progress() { if (!this.fitted) wait(this.head); }
 
   plots() {
     const { field } = this, { data } = field;
@@ -128,21 +164,24 @@ export class See {
     if (strain && !["angle", "place", "phase"].includes(this.x) && !data[this.x]) this.x = "angle";
     fill(this.tools, h("h2", {}, strain ? runWords(data, field.rows[field.row].index) : field.rows[field.row].label), h("span", { class: "room" }),
       strain ? h("label", {}, h("input", { type: "checkbox", checked: this.gages, onchange: (e) => { this.gages = e.target.checked; this.plots(); } }), " each gage") : null);
-    const xs = [...(strain ? [["angle", "wheel angle"], ["place", "place in the contact"]] : []), ...has.map(([k, t]) => [k, t]), ...(strain ? [["phase", "once-per-turn phase"]] : [])];
-    const ys = [["difference", "model less measured"], ...(data.white.some(Number.isFinite) ? [["white", "whitened residual"]] : []), ["measured", "measured"]];
+    const xs = [...(strain ? [["angle", "wheel angle"], ...(data.edges ? [["place", "place in the contact"]] : [])] : []), ...has.map(([k, t]) => [k, t]), ...(strain ? [["phase", "once-per-turn phase"]] : [])];
+    const ys = known(data).map((k) => [k, VALUES[k]]);
+    if (!known(data).includes(this.y)) [this.y] = known(data);
+    if (this.x === "place" && !data.edges) this.x = "angle";
     fill(this.tools2, choose(ys, this.y, (v) => { this.y = v; this.plots(); }, "y"), choose(xs, this.x, (v) => { this.x = v; this.plots(); }, "over"));
     if (strain) this.strainPlots(); else this.forcePlots();
+    this.arrange();
   }
 
   strainPlots() {
     const { field } = this, { data } = field, i = field.rows[field.row].index, along = this.x === "place" ? "place" : "angle";
-    const [a, b] = [data.edges[2 * i], data.edges[2 * i + 1]];
+    const [a, b] = along === "place" ? [data.edges[2 * i], data.edges[2 * i + 1]] : [];
     const xs = along === "place" ? data.angle.map((x) => (2 * x - a - b) / (b - a)) : data.angle;
     const x = { title: along === "place" ? "place in the model's contact [1] (entry −1, exit +1)" : "wheel angle [deg]", values: Array.from(xs), range: along === "place" ? [-3, 3] : undefined };
-    const one = (name) => sliced(data, name, i), noise = data.noise[0];
+    const one = (name) => sliced(data, name, i), noise = data.noise?.[0];
     const measured = one("measured"), gages = this.gages ? gageLines(data, i, "measured_by_gage") : [];
     const band = Number.isFinite(noise) ? [{ name: "noise, upper", values: measured.map((v) => v + 2 * noise), color: "measured", width: 0.5, quiet: true }, { name: "noise, lower", values: measured.map((v) => v - 2 * noise), color: "measured", width: 0.5, quiet: true }] : [];
-    field.curve.show({ title: `strain, mean of the gages; band: ± 2 noise`, unit: "microstrain", x, bands: band.length ? [[1, 2, "measured"]] : [], series: [...band, { name: "measured", values: measured, color: "measured" }, { name: "model", values: one("model"), color: "model", dash: [8, 4] }, ...gages] });
+    field.curve.show({ title: `strain, mean of the gages${band.length ? "; band: ± 2 noise" : ""}`, unit: "microstrain", x, bands: band.length ? [[1, 2, "measured"]] : [], series: [...band, { name: "measured", values: measured, color: "measured" }, ...(data.model ? [{ name: "model", values: one("model"), color: "model", dash: [8, 4] }] : []), ...gages] });
     if (["angle", "place"].includes(this.x)) {
       const lines = this.gages && this.y !== "white" ? gageLines(data, i, this.y === "measured" ? "measured_by_gage" : "by_gage") : [];
       const unit = this.y === "white" ? "noise" : "microstrain";
@@ -173,7 +212,7 @@ export class See {
       plot.points = true;
       plot.show({ title, unit: label, y: `${name}, ISO 8855 [${label}]`, x: { title: `${text} [${u}]`, values: order.map((i) => data[key][i]) }, extra: [["run", order.map((i) => data.run[i])]], series: series.map((s) => ({ ...s, points: true, values: order.map((i) => data[s.from][i]) })) });
     };
-    draw(field.curve, field.rows[field.row].members, field.slip.key, [{ name: "measured", from: "measured", color: "measured" }, { name: "model", from: "model", color: "model", hollow: true }], "measured (filled) and model (hollow) at these conditions", unit);
+    draw(field.curve, field.rows[field.row].members, field.slip.key, [{ name: "measured", from: "measured", color: "measured" }, ...(data.model ? [{ name: "model", from: "model", color: "model", hollow: true }] : [])], data.model ? "measured (filled) and model (hollow) at these conditions" : "measured at these conditions", unit);
     draw(field.rest, [...data.run.keys()], this.x, [{ name: VALUES[this.y] || this.y, from: this.y, color: "rest" }], "all points", this.y === "white" ? "noise" : unit);
   }
 }
@@ -204,9 +243,9 @@ export function wait(place, kinds = ["check", "identify", "compare"]) {
     wish({ do: "look", campaign: c.campaign, model: model.number, quantity: c.quantity });
   }
   fill(place, h("h2", {}, running.length ? "Being computed" : broken ? "It could not be computed" : "Nothing to be seen yet"),
-    running.length && !model ? h("p", { class: "quiet" }, "The campaign is checked, then the base model is fitted to it and compared with it. For 66 runs that takes about 15 s on an idle machine; the page shows it by itself, and you may look at the runs in step 1 meanwhile.") : null,
+    running.length && !model ? h("p", { class: "quiet" }, "The campaign is checked, then the base model is fitted to it and compared with it. For 66 runs that takes about 15 s on an idle machine; the page then shows it by itself. What was measured needs no model: it appears below as soon as the runs are read.") : null,
     c.check?.errors ? h("p", { class: "bad" }, `The campaign has ${c.check.errors} errors; they stand in step 1 with what to do.`) : null,
-    running.map((job) => { const at = progressOf(job.job); return h("p", {}, `${job.title}: ${job.state === "running" ? at?.label || "begins" : "waits"}`); }),
+    running.map((job) => { const at = progressOf(job.job); return h("p", {}, `${job.title}: ${job.state === "running" ? labelOf(at) || "begins" : "waits"}`); }),
     !running.length && broken ? [h("p", { class: "bad" }, `${broken.title}: ${broken.state}. ${broken.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: broken.job }) }, "Run again")), ways(c, model)] : null);
 }
 

@@ -1,5 +1,5 @@
 // The frame: steps, campaign, quantity, jobs; the view of the step that the address names.
-import { active, app, connect, current, listen, nameOf, progressOf, refresh, wish } from "./data.js";
+import { active, app, connect, current, labelOf, listen, nameOf, progressOf, refresh, wish } from "./data.js";
 import { h, fill, toast } from "./dom.js";
 import { entries, Open, receive } from "./open.js";
 import { See } from "./see.js";
@@ -58,7 +58,7 @@ function jobs() {
   for (const box of place.children) {
     const at = progressOf(Number(box.dataset.job)), bar = box.querySelector("progress");
     if (at?.total) { bar.max = at.total; bar.value = Math.min(at.done, at.total); } else bar.removeAttribute("value");
-    box.querySelector("[data-label]").textContent = at ? at.label || (at.done ? `step ${at.done}` : "begins") : "waits";
+    box.querySelector("[data-label]").textContent = at ? labelOf(at) || (at.done ? `step ${at.done}` : "begins") : "waits";
   }
 }
 
