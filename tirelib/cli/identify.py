@@ -127,7 +127,7 @@ def _say_ring(console: Console, document: dict[str, Any], gages: int) -> None:
         f"{document['campaign']}: {len(document['runs'])} straight runs, {len(document['gages'])} "
         f"of {gages} gages averaged; the residual is {document['rms_ustrain']:.0f} of "
         f"{document['strain_rms_ustrain']:.0f} microstrain rms; error {document['error']:.3g} "
-        f"[{'noise' if document['error_unit'] == 'noise' else 'microstrain'}]"
+        f"{'times the noise' if document['error_unit'] == 'noise' else 'microstrain'}"
     )
     _say_parameters(console, document["parameters"])
     stiffness = document["vertical_stiffness"]

@@ -111,7 +111,10 @@ def next_step(
     """
     said = {
         "none": lambda: "none is needed for the effects that this plan can show",
-        "named": lambda: f"add {told.named[0]} (`tirelib add {told.named[0]}`) and diagnose again",
+        "named": lambda: (
+            f"add {listed(told.named, 'nothing')} (`tirelib add {' '.join(told.named)}`) "
+            "and diagnose again"
+        ),
         **words,
     }
     between = list(told.named) if told.verdict == "indistinguishable" else []

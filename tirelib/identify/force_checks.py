@@ -27,10 +27,10 @@ def slips_vary(data: ForceData) -> tuple[bool, bool]:
         only = round(float(np.median(data.slip_angle)), 4)
         raise CalibrationError(
             f"brush fit: the only slip angle is {np.rad2deg(only) + 0.0:.2f} deg "
-            f"and the only slip ratio {np.median(data.slip_ratio):.3f}: slip angles span "
-            f"{np.rad2deg(angles):.2g} deg and slip ratios {ratios:.2g} over {len(data)} points; "
-            f"at least {np.rad2deg(ANGLE_SPAN):g} deg or {RATIO_SPAN:g} is needed; add runs with "
-            "other slip angles or slip ratios, or mend the unit of the slip"
+            f"and the only slip ratio {np.median(data.slip_ratio):.3f} at {len(data)} points (they "
+            f"span {np.rad2deg(angles):.2g} deg and {ratios:.2g}); a span of "
+            f"{np.rad2deg(ANGLE_SPAN):g} deg or {RATIO_SPAN:g} is needed; add runs with other slip "
+            "angles or slip ratios, or correct the unit of the slip"
         )
     return bool(angles >= ANGLE_SPAN), bool(ratios >= RATIO_SPAN)
 

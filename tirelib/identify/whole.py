@@ -92,7 +92,8 @@ def identify_whole(
     try:
         brush = identify_forces(campaign, tire, progress=progress)
     except TirelibError as error:
-        reasons.append(f"no brush: {error}")
+        kept = "; the ring's parameters are not affected" if ring is not None else ""
+        reasons.append(f"forces are not fitted{kept}. {error}")
     if ring is None and known is not None and brush is not None and brush.fit.tire is not None:
         reasons.append(f"the ring of {known.name} gives the contact length")
     if ring is None and brush is None:

@@ -196,20 +196,26 @@ def error_line(told: Mapping[str, Any]) -> str:
     """
     unit = "times the noise" if told["error_unit"] == "noise" else unit_name(told["error_unit"])
     before, after = told["error_before"], told["error_after"]
-    raw = unit_name(told["residual_rms_unit"])
-    rms = [
-        f"{number(told[f'residual_rms_{when}'], SENSE)} {raw} rms" for when in ("before", "after")
-    ]
+    raw = f"{unit_name(told['residual_rms_unit'])} rms"
+    left = [number(told[f"residual_rms_{when}"], SENSE) for when in ("before", "after")]
+    rms = [f" ({size} {raw})" for size in left]
     changed = told.get("named") or told.get("action")
     if not changed:
-        text = f"It is {_said(before)} {unit} ({rms[0]})"
+        text = f"It is {_said(before)} {unit}{rms[0]}"
         text += _refitted(told)
         return f"{text}.{_floor(told, after)}"
-    text = f"It was {_said(before)} {unit} ({rms[0]}){_refitted(told)}"
+    parted = after < before and told["residual_rms_after"] > told["residual_rms_before"]
+    rms = ["", ""] if parted else rms
+    text = f"It was {_said(before)} {unit}{rms[0]}{_refitted(told)}"
     without = " without it" if told.get("action") == "remove" else " with it"
     if len(told.get("named", ())) > 1 and told.get("verdict") != "indistinguishable":
         without = " with them"
-    text += f", and is {_said(after)}{without} ({rms[1]}).{_floor(told, after)}"
+    text += f", and is {_said(after)}{without}{rms[1]}.{_floor(told, after)}"
+    if parted:
+        text += (
+            f" With the delay of the gages and the errors of the set points left in, {left[0]} "
+            f"became {left[1]} {raw}."
+        )
     return f"{text} {held_out_line(told)}".strip()
 
 
@@ -312,7 +318,8 @@ def _next(told: Mapping[str, Any], model: str, folder: str) -> str:
     if told["verdict"] in ("named", "form_inadequate"):
         option = "" if told["quantity"] == "strain" else f" --quantity {told['quantity']}"
         return (
-            f"Add it: tirelib add {told['named'][0]} --model {model} --data {folder}{option} "
+            f"Add {'it' if len(told['named']) == 1 else 'them together'}: "
+            f"tirelib add {' '.join(told['named'])} --model {model} --data {folder}{option} "
             "--out M2.toml; then diagnose again with the new model."
         )
     what = str(told["next_test"]["what"]).rstrip(".")

@@ -84,6 +84,20 @@ def test_what_is_named_is_told_with_its_size_its_fall_and_the_command_that_adds_
     ]
 
 
+def test_two_effects_that_are_named_together_are_added_together() -> None:
+    """One of two alone may raise the error on what is held out: it was judged with the other."""
+    told = explained(diagnosis(named=["damping", "shear"]), "M.toml", "DIR")
+    assert told.next.startswith("Add them together: tirelib add damping shear --model M.toml ")
+
+
+def test_a_plain_difference_that_rises_while_the_error_falls_is_told_with_its_reason() -> None:
+    told = error_line(diagnosis(residual_rms_before=28.2, residual_rms_after=46.9))
+    assert "It was 30 times the noise, 23.5 with" in told
+    assert "With the delay of the gages and the errors of the set points left in, 28.2" in told
+    assert "became 46.9 microstrain rms" in told
+    assert "left in" not in error_line(diagnosis())
+
+
 def test_what_does_not_fall_on_what_was_held_out_is_said() -> None:
     same = diagnosis(heldout_error_before=6.7, heldout_error_after=6.68)
     assert held_out_line(same) == (

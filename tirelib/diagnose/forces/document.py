@@ -60,8 +60,8 @@ def next_test(told: ForceAssessment) -> dict[str, Any]:
     words = {
         "indistinguishable": lambda: parting(told, told.named),
         "form_inadequate": lambda: (
-            f"add {told.named[0]} (`tirelib add {told.named[0]}`); more is left than plain "
-            f"tires leave: more levels of {_and(varies)} would show the right law"
+            f"add {listed(told.named, 'nothing')} (`tirelib add {' '.join(told.named)}`); more is "
+            f"left than plain tires leave: more levels of {_and(varies)} would show the right law"
         ),
         "unknown": lambda: (
             f"the misfit stands {told.left.where} and {told.left.scaling}: more levels there, or "
