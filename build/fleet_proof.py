@@ -24,6 +24,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from threading import Thread
 
+import numpy as np
 import psutil
 from distributed import Client
 from rich.console import Console
@@ -216,23 +217,30 @@ def _processor(client: Client) -> float:
 
 
 def workers(folder: Path, count: int) -> None:
-    """Throughput with one worker and with two, as wall time and as processor time."""
+    """Throughput with one worker and with two in turns, by the clock and as processor time."""
     known = calibration(folder)
     paths = campaigns(folder, count)
-    for number in (1, 2):
+    walls: dict[int, list[float]] = {1: [], 2: []}
+    for number in (1, 2, 2, 1, 1, 2):
         out = folder / f"out-{number}-{time.monotonic_ns()}"
         with engine.cluster(None, number) as client:
             data = DataSet(str(out))
             data.open()
             recipe = engine.recipe_of("estimate", data, files={"calibration": str(known)})
-            engine.run(find_sources([str(paths / "000000")]), data, recipe, client, run_verb)
-            before, began = _processor(client), time.monotonic()
+            first = ["estimate", str(paths / "000000"), "--calibration", str(known)]
+            client.run(run_verb, first)  # every worker has its imports behind it
+            before, own, began = _processor(client), _spent(), time.monotonic()
             counts = engine.run(find_sources([str(paths)]), data, recipe, client, run_verb)
             wall, spent = time.monotonic() - began, _processor(client) - before
+            own = _spent() - own
+        walls[number].append(wall)
         SAY(
             f"{number} worker(s): {counts.done} done in {wall:.1f} s, {counts.done / wall:.2f} a "
-            f"second; {1e3 * spent / counts.done:.0f} ms of processor a task"
+            f"second; {1e3 * spent / counts.done:.0f} ms of processor a task, client with "
+            f"scheduler {1e3 * own / counts.done:.1f} ms; load {os.getloadavg()[0]:.1f}"
         )
+    one, two = (float(np.median(walls[number])) for number in (1, 2))
+    SAY(f"parallel efficiency of two workers, by the clock: {one / (2.0 * two):.0%}")
 
 
 def endurance(folder: Path, minutes: float) -> None:

@@ -226,6 +226,29 @@ def test_wrong_options_of_the_verb_are_said_once_before_any_work(
     assert not (tmp_path / "out").exists()
 
 
+def test_errors_that_a_check_found_are_counted_also_when_it_was_finished_before(
+    campaigns: Path, client: Client, tmp_path: Path
+) -> None:
+    for done, skipped in ((4, 0), (0, 4)):
+        counts = run("check", [campaigns], tmp_path / "out", client)
+        assert (counts.done, counts.skipped, counts.failed, counts.negative) == (
+            done,
+            skipped,
+            0,
+            1,
+        )
+
+
+def test_failures_of_one_cause_are_one_line(client: Client, tmp_path: Path) -> None:
+    for day in range(3):
+        (tmp_path / f"day-{day}").mkdir()
+        (tmp_path / f"day-{day}" / "campaign.toml").write_text('format = "tirelib-campaign/99"\n')
+    counts = run("features", [tmp_path], tmp_path / "out", client)
+    ((message, number),) = engine.causes(counts)
+    assert (counts.failed, number) == (3, 3)
+    assert "day-0" in message
+
+
 def test_patterns_find_each_once(campaigns: Path) -> None:
     found = find_sources([f"{campaigns}/no*/day-*", str(campaigns / "north")])
     assert [Path(source.url).name for source in found] == ["day-0", "day-1", "day-2"]

@@ -181,6 +181,23 @@ def test_a_tire_with_few_runs_gains_from_its_siblings(data: DataSet) -> None:
             assert "tire 04" not in gain  # it stands out
 
 
+def test_campaigns_of_one_name_are_told_apart_and_negative_answers_shown(tmp_path: Path) -> None:
+    data = DataSet(str(tmp_path / "data"))
+    data.open()
+    rows = [
+        container(k, "check", "tire 00", 0) | {"file_path": f"/data/{place}", "answer": int(k == 2)}
+        for k, place in enumerate(("north/a", "south/a", "south/b"))
+    ]
+    reason = {"container_id": 2, "kind": "error", "name": "runs.csv", "text": "missing; write one"}
+    data.add("check", {"container_metrics": rows, "results": [reason | ORIGIN]})
+    found = fleet_document(data)
+    names = [each["name"] for each in found["containers"]]
+    assert names == ["day 0 (a) (/data/north/a)", "day 0 (a) (/data/south/a)", "day 0 (b)"]
+    (negative,) = found["negative"]
+    assert (negative["name"], negative["first"]) == (names[2], "runs.csv: missing; write one")
+    assert "runs.csv: missing" in Path(write_fleet_page(data)).read_text()
+
+
 def test_a_click_on_a_point_opens_its_campaign(data: DataSet) -> None:
     with chromium() as browser:
         page = browser.new_page(viewport={"width": 1200, "height": 900})

@@ -42,7 +42,8 @@ PATHS are folders, patterns or URLs; every campaign (campaign.toml) and recordin
 below them is one task. DATASET gets Parquet tables, a page for each campaign, and index.html for
 all of them. Finished ones are skipped, so the same command goes on where it stopped. A calibration
 or model may be a file, or the DATASET of an earlier `calibrate` or `identify`.
-Exit code: 0 all done, 1 some failed or it was interrupted, 2 bad input.
+Exit code: 0 all done, 1 some failed or have a negative answer (a check that found errors), or it
+was interrupted, 2 bad input.
 """
 
 
@@ -168,7 +169,7 @@ def fleet(
         console.print(f"written: {json_file}")
     if stopped:
         click.echo(f"Error: {stopped}", err=True)
-    context.exit(1 if counts.failed or stopped else 0)
+    context.exit(1 if counts.failed or counts.negative or stopped else 0)
 
 
 def _options(task: str, more: str) -> list[str]:
@@ -253,6 +254,8 @@ def _print(console: Console, task: str, counts: "Counts", causes: list[tuple[str
         f"{counts.skipped + counts.known} finished before, {counts.failed} failed, "
         f"{counts.left} left"
     )
+    if counts.negative:
+        console.print(f"  the answer is negative for {counts.negative} of them; see the page")
     for message, number in causes[:SHOWN]:
         console.print(f"  failed ({number}): {message}")
     if len(causes) > SHOWN:
@@ -268,6 +271,7 @@ def _document(task: str, out: str, counts: "Counts") -> dict[str, Any]:
         "done": counts.done,
         "finished_before": counts.skipped + counts.known,
         "failed": counts.failed,
+        "negative": counts.negative,
         "left": counts.left,
         "failures": [
             {"path": path, "message": message} for path, message in counts.messages.items()

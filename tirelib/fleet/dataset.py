@@ -149,12 +149,13 @@ class DataSet:
             if path.endswith(".parquet") and f"/{name}/{PARTITION}=" in path and "/." not in path
         ]
 
-    def finished(self, task: str, recipe: str) -> tuple[set[int], set[str]]:
-        """Return the identifiers and the fingerprints of what is finished."""
-        columns = ["container_id", "fingerprint"]
+    def finished(self, task: str, recipe: str) -> tuple[dict[int, int], dict[str, int]]:
+        """Return the verb's exit code of what is finished, by identifier and by fingerprint."""
+        columns = ["container_id", "fingerprint", "answer"]
         chosen = (pads.field(PARTITION) == task) & (pads.field("recipe") == recipe)
         rows = self.table("container_metrics", columns, chosen)
-        return set(rows["container_id"].to_pylist()), set(rows["fingerprint"].to_pylist())
+        ids, marks, answers = (rows[name].to_pylist() for name in columns)
+        return dict(zip(ids, answers, strict=True)), dict(zip(marks, answers, strict=True))
 
     def repair(self, task: str) -> None:
         """Remove the files of batches that were not written to their end."""

@@ -4,7 +4,6 @@ import json
 import logging
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -43,15 +42,17 @@ the short tasks of a fleet, and takes part of the processor (``build/fleet_proof
 
 @dataclass(slots=True)
 class Counts:
-    """How far a fleet has come."""
+    """How far a fleet has come; `negative` are those of the finished whose answer is negative."""
 
     total: int = 0
     skipped: int = 0
     known: int = 0
     done: int = 0
     failed: int = 0
+    negative: int = 0
     began: float = field(default_factory=time.monotonic)
     messages: dict[str, str] = field(default_factory=dict)
+    causes: dict[str, list[str]] = field(default_factory=dict)
 
     @property
     def left(self) -> int:
@@ -274,12 +275,13 @@ def _delta(data: DataSet) -> "DeltaLog":
 
 
 def _unfinished(
-    sources: Sequence[Source], marks: set[str], counts: Counts
+    sources: Sequence[Source], marks: Mapping[str, int], counts: Counts
 ) -> Iterator[tuple[Source, str]]:
     for source in sources:
         mark = fingerprint(source)
         if mark in marks:
             counts.skipped += 1
+            counts.negative += bool(marks[mark])
         else:
             yield source, mark
 
@@ -333,20 +335,23 @@ def _take(outcome: Outcome, source: Source, counts: Counts, book: "_Book") -> No
     if outcome.failed:
         counts.failed += 1
         counts.messages[source.url] = outcome.failed
+        cause = outcome.rows["failures"][0]["cause"]
+        counts.causes.setdefault(cause, []).append(outcome.failed)
     elif outcome.known:
         counts.known += 1
     else:
         counts.done += 1
     book.add(outcome)
+    counts.negative += bool(book.answers.get(outcome.container))
 
 
 class _Book:
     """Rows that are still to be added to the data set."""
 
     def __init__(
-        self, data: DataSet, task: str, finished: set[int], log: "DeltaLog | None"
+        self, data: DataSet, task: str, finished: dict[int, int], log: "DeltaLog | None"
     ) -> None:
-        self._data, self._task, self._finished, self._log = data, task, finished, log
+        self._data, self._task, self.answers, self._log = data, task, finished, log
         self._open()
 
     def _open(self) -> None:
@@ -360,10 +365,11 @@ class _Book:
         """Keep the rows of an outcome, once for each container."""
         if outcome.note:
             self._notes.append(outcome.note)
-        if outcome.known or (outcome.container in self._finished and not outcome.failed):
+        if outcome.known or (outcome.container in self.answers and not outcome.failed):
             return
         if not outcome.failed:
-            self._finished.add(outcome.container)
+            (row,) = outcome.rows["container_metrics"]
+            self.answers[outcome.container] = row.get("answer", 0)
             self._channels.append(f"{PARTITION}={self._task}/{outcome.container}.parquet")
         if not self._count:
             self._since = time.monotonic()
@@ -391,6 +397,6 @@ class _Book:
 
 
 def causes(counts: Counts) -> list[tuple[str, int]]:
-    """Return the messages of what failed, the most frequent first."""
-    said = Counter(message.splitlines()[0] for message in counts.messages.values())
-    return said.most_common()
+    """Return a message of each cause of failure, the most frequent first, with their numbers."""
+    ordered = sorted(counts.causes.values(), key=len, reverse=True)
+    return [(messages[0].splitlines()[0], len(messages)) for messages in ordered]

@@ -40,13 +40,9 @@ LARGEST_P = FALSE_ALARM
 
 def fleet_document(data: DataSet) -> dict[str, Any]:
     """Return what stands out, what changes, what is joined, what is missing and what failed."""
-    containers = {
-        row["container_id"]: row
-        for row in data.table(
-            "container_metrics",
-            ["container_id", "task", "name", "tire", "start_ts", "page", "answer", "file_path"],
-        ).to_pylist()
-    }
+    columns = ["container_id", "task", "name", "tire", "start_ts", "page", "answer", "file_path"]
+    rows = _told_apart(data.table("container_metrics", columns).to_pylist())
+    containers = {row["container_id"]: row for row in rows}
     sizes = _sizes(data)
     return {
         "format": "tirelib-fleet-page/1",
@@ -54,8 +50,24 @@ def fleet_document(data: DataSet) -> dict[str, Any]:
         "parameters": _parameters(data, containers, sizes),
         "changes": _changes(data, containers),
         "effects": _effects(data, containers),
+        "negative": _negative(data, containers),
         "failures": _failures(data, containers),
     }
+
+
+def _told_apart(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return containers whose names differ within a task and tire: with folder, else with path."""
+    for whole in (False, True):
+        count = Counter(map(_known_as, rows))
+        for row in rows:
+            if count[_known_as(row)] > 1:
+                place = row["file_path"]
+                row["name"] += f" ({place if whole else place.rpartition('/')[2]})"
+    return rows
+
+
+def _known_as(row: Mapping[str, Any]) -> tuple[str, str, str]:
+    return row["task"], row["tire"], row["name"]
 
 
 def write_fleet_page(data: DataSet) -> str:
@@ -237,6 +249,23 @@ def _effects(data: DataSet, containers: Mapping[int, Any]) -> list[dict[str, Any
         }
         for row in verdicts
         if row["container_id"] in containers
+    ]
+
+
+def _negative(data: DataSet, containers: Mapping[int, Any]) -> list[dict[str, Any]]:
+    """Return what ended with a negative answer, with the first reason and their number."""
+    kinds = pads.field("kind").isin(["error", "reason"]) & pads.field("text").is_valid()
+    reasons: dict[int, list[str]] = defaultdict(list)
+    for row in data.table("results", ["container_id", "name", "text"], kinds).to_pylist():
+        reasons[row["container_id"]].append(": ".join(filter(None, (row["name"], row["text"]))))
+    return [
+        {
+            **{key: row[key] for key in ("task", "name", "tire", "page", "file_path")},
+            "reasons": len(reasons[number]),
+            "first": next(iter(reasons[number]), ""),
+        }
+        for number, row in containers.items()
+        if row["answer"]
     ]
 
 

@@ -37,9 +37,9 @@ def write_fleet(
 
 def _count(document: Mapping[str, Any]) -> str:
     by_task = Counter(row["task"] for row in document["containers"])
-    tires = {row["tire"] for row in document["containers"]}
+    tires = {row["tire"] for row in document["containers"] if row["tire"]}
     tasks = ", ".join(f"{task} {count}" for task, count in sorted(by_task.items())) or "none"
-    return f"Finished campaigns and recordings: {tasks}; {len(tires)} tires"
+    return f"Finished campaigns and recordings: {tasks}; tires: {len(tires)}"
 
 
 def _lines(document: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -66,6 +66,8 @@ def _lines(document: Mapping[str, Any]) -> list[tuple[str, str]]:
         ),
         ("Failed", f"{failed}, see the causes below" if failed else "none"),
     ]
+    if document["negative"]:
+        lines.append(("Negative answers", f"{len(document['negative'])}, see below"))
     if gains:
         lines.append(
             (
@@ -89,6 +91,7 @@ def fleet_parts(document: Mapping[str, Any]) -> list[Part]:
         _effects(document["effects"]),
         _joined(document["parameters"]),
         _failures(document["failures"]),
+        _negative(document["negative"]),
         _containers(document["containers"]),
     ]
     return [part for part in parts if part.plots or part.tables]
@@ -160,8 +163,8 @@ def _parameter_plot(index: int, each: Mapping[str, Any]) -> Plot:
         f"parameter-{index}",
         f"{each['name'].replace('_', ' ')}"
         + (f", free radius {each['size']}" * bool(each["size"])),
-        f"Mean {number(each['centre'])}, scatter between tires {number(each['scatter'])} "
-        f"{each['unit']}. ",
+        f"Mean {number(each['centre'])}, scatter between tires {number(each['scatter'])}"
+        f"{f' {unit}' if (unit := each['unit']) != '1' else ''}. ",
         figure,
         ("tire", "campaign", "value", "low", "high", "stands out"),
         [[p["tire"], p["campaign"], p["value"], p["low"], p["high"], p["outlier"]] for p in points],
@@ -333,6 +336,23 @@ def _failures(failures: Sequence[Mapping[str, Any]]) -> Part:
     )
     tables = [table] if table.rows else []
     return Part("Failures", "failures", "The same command tries them again.", tables)
+
+
+def _negative(negative: Sequence[Mapping[str, Any]]) -> Part:
+    table = Table.of(
+        "Negative answers",
+        negative[:MOST_ROWS],
+        {
+            "campaign": lambda each: _link(each["page"], each["name"]),
+            "tire": lambda each: each["tire"],
+            "task": lambda each: each["task"],
+            "first reason": lambda each: each["first"].partition(";")[0][:160],
+            "reasons": lambda each: str(each["reasons"]),
+        },
+        texts=4,
+    )
+    text = "The work was done and its answer is no: a check found errors, or no turn is valid."
+    return Part("Negative answers", "negative", text, [table] if table.rows else [])
 
 
 def _containers(containers: Sequence[Mapping[str, Any]]) -> Part:
