@@ -36,6 +36,7 @@ html_theme = "furo"
 html_title = "tirelib"
 exclude_patterns = ["_build", "_generated", "tutorials"]
 autodoc_typehints = "none"
+autodoc_preserve_defaults = True
 sphinx_gallery_conf = {
     "examples_dirs": "tutorials",
     "gallery_dirs": "_tutorials",

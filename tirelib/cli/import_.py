@@ -16,6 +16,7 @@ from tirelib.cli.common import FILE, NEW_FOLDER, output, write_json
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import progress_bar, progress_options
 
+PLACE = click.Path(path_type=Path)
 FORMAT = "tirelib-import/1"
 LIST_FORMAT = "tirelib-import-list/1"
 
@@ -45,7 +46,7 @@ Exit code: 0 done, 2 bad input (all faults are listed, nothing is written).
 
 
 @click.command("import", epilog=_EXAMPLE)
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PLACE)
 @click.option("--map", "map_file", metavar="MAP.toml", type=FILE, help="Import map (TOML).")
 @click.option("--out", metavar="DIR", type=NEW_FOLDER, help="Campaign folder.")
 @click.option("--force", is_flag=True, help="Replace a campaign that already exists in DIR.")
@@ -63,6 +64,8 @@ def import_(
     json_file: Path | None,
 ) -> None:
     """Make a campaign from measured files: MATLAB, CSV, Parquet, TYDEX, loose MDF 4."""
+    for folder in (file for file in files if file.is_dir()):
+        raise click.UsageError(f"{folder} is a folder; name its files, for example {folder}/*.csv")
     layout: CsvOptions | None = None
     if map_file is not None and (suggest or show_list):
         layout = parse_map(map_file, "")[0].csv

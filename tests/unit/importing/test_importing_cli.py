@@ -47,6 +47,12 @@ def test_an_import_exits_0_and_its_campaign_passes_check_and_show(tmp_path: Path
     assert show.exit_code == 0, show.output
 
 
+def test_a_folder_is_answered_with_what_to_type(tmp_path: Path) -> None:
+    result = call(tmp_path, "--list")
+    assert result.exit_code == 2
+    assert f"{tmp_path} is a folder; name its files, for example {tmp_path}/*.csv" in result.output
+
+
 def test_bad_input_exits_2_lists_all_faults_and_writes_nothing(tmp_path: Path) -> None:
     columns = sae_columns()
     columns["FZ"] = -columns["FZ"]
