@@ -14,6 +14,7 @@ import pytest
 
 pytest.importorskip("distributed", reason="the extra tirelib[fleet] is not installed")
 
+import dask.config
 from distributed import Client, LocalCluster
 
 from tests.synthetic import synthetic_run, write
@@ -136,6 +137,17 @@ def test_a_killed_client_and_then_the_same_again(
     counts = run(many, out, client)
     assert counts.failed == 0
     assert len(set(finished(out))) == len(finished(out)) == COUNT
+
+
+def test_a_worker_that_starts_slowly_again_is_not_given_up() -> None:
+    with (
+        dask.config.set({"distributed.deploy.lost-worker-timeout": "0s"}),
+        engine.cluster(None, 1) as client,
+    ):
+        (first,) = client.run(os.getpid).values()
+        os.kill(first, signal.SIGKILL)
+        second = client.submit(os.getpid, pure=False).result(timeout=PATIENCE)
+    assert second != first
 
 
 def test_a_worker_keeps_no_call_stacks_of_what_it_did() -> None:

@@ -38,6 +38,9 @@ CONNECT = 20.0
 NO_PROFILER = {"distributed.worker.profile.enabled": False}
 """Dask's profiler keeps call stacks of the last 1,000 seconds in each worker, 0.4 MB a second with
 the short tasks of a fleet, and takes part of the processor (``build/fleet_proof.py memory``)."""
+PATIENT = {"distributed.deploy.lost-worker-timeout": "1 hour"}
+"""Time in which a killed worker of this machine may come back. Dask would give it up for ever after
+15 s, and a machine with much else to do starts it later (``build/fleet_proof.py endurance``)."""
 
 
 @dataclass(slots=True)
@@ -80,7 +83,7 @@ def cluster(address: str | None, workers: int | None) -> Iterator[Client]:
     """
     if address is None:
         with (
-            dask.config.set(NO_PROFILER),
+            dask.config.set(NO_PROFILER | PATIENT),
             LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
