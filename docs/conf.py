@@ -37,6 +37,7 @@ html_title = "tirelib"
 exclude_patterns = ["_build", "_generated", "tutorials"]
 autodoc_typehints = "none"
 autodoc_preserve_defaults = True
+smartquotes = False  # two dashes are an option, not a dash
 sphinx_gallery_conf = {
     "examples_dirs": "tutorials",
     "gallery_dirs": "_tutorials",

@@ -132,7 +132,7 @@ for k in range(int(3.0 / STEP)):
     rows.append((k * STEP, now["Fz"], load, std, fx, kappa, slip))
 tire.close()
 strain.close()
-time, true, told, std, fx, kappa, slip = np.array(rows).T
+time, true, estimated, std, fx, kappa, slip = np.array(rows).T
 
 # %%
 # What came out
@@ -143,14 +143,15 @@ time, true, told, std, fx, kappa, slip = np.array(rows).T
 
 braking = time > 1.2
 share = -fx[braking] / true[braking]
-late = told[braking] / true[braking] - 1
+late = estimated[braking] / true[braking] - 1
 print(f"braking force over load: {share.mean():.3f} (asked: {SHARE}), std {share.std():.3f}")
 print(f"estimated load held over the turn: {100 * np.sqrt(np.mean(late**2)):.1f} % rms")
 
 fig, (upper, lower) = plt.subplots(2, 1, figsize=(7, 4.6), sharex=True)
 upper.plot(time, true / 1e3, label="true")
-upper.step(time, told / 1e3, where="post", label="estimated")
-upper.fill_between(time, (told - 2 * std) / 1e3, (told + 2 * std) / 1e3, alpha=0.3, step="post")
+upper.step(time, estimated / 1e3, where="post", label="estimated")
+low, high = (estimated - 2 * std) / 1e3, (estimated + 2 * std) / 1e3
+upper.fill_between(time, low, high, alpha=0.3, step="post")
 upper.set(ylabel="Fz [kN]")
 upper.legend()
 lower.plot(time, 100 * kappa, label="true")
