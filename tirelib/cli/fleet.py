@@ -147,6 +147,8 @@ def fleet(
     stopped = ""
     with engine.cluster(scheduler, workers) as client:
         click.echo(f"Dask dashboard: {client.dashboard_link}", err=True)
+        if not client.nthreads():
+            click.echo("Warning: no worker has joined; the work begins with the first", err=True)
         with _progress(task) as show:
             counts = engine.Counts()
             try:
