@@ -30,13 +30,18 @@ NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"
 HOUR = 3600.0
 
 
+def chromium_path() -> str | None:
+    """Return the browser of this machine."""
+    return next((found for name in NAMES if (found := shutil.which(name))), None)
+
+
 @contextmanager
-def studio(session: Path, *words: str) -> Iterator[str]:
-    """Run the server; give its address."""
+def studio(session: Path, *words: str) -> Iterator[tuple[str, int]]:
+    """Run the server; give its address and its process."""
     command = [str(TIRELIB), "studio", *words, "--session", str(session), "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         line = server.stdout.readline() if server.stdout is not None else ""
-        yield line.partition(" ")[2].strip()
+        yield line.partition(" ")[2].strip(), server.pid
         server.terminate()
 
 
@@ -131,11 +136,10 @@ def main() -> None:
     parser.add_argument("--session", type=Path, help="keep the session there")
     given = parser.parse_args()
     out = given.out or (None if given.campaign else ROOT / "docs" / "howto" / "studio")
-    path = next((found for name in NAMES if (found := shutil.which(name))), None)
     with TemporaryDirectory() as temporary, sync_playwright() as playwright:
         session = given.session or Path(temporary)
         browser = playwright.chromium.launch(
-            executable_path=path, args=["--no-sandbox"], timeout=3e5
+            executable_path=chromium_path(), args=["--no-sandbox"], timeout=3e5
         )
         page = browser.new_context(viewport={"width": 1280, "height": 860}).new_page()
         page.set_default_timeout(1e3 * HOUR)
@@ -148,7 +152,7 @@ def main() -> None:
                 out.mkdir(parents=True, exist_ok=True)
                 page.screenshot(path=out / f"{name}.png", full_page=True)
 
-        with studio(session, *([given.campaign] if given.campaign else [])) as url:
+        with studio(session, *([given.campaign] if given.campaign else [])) as (url, _):
             page.goto(url)
             took = walk(page, given.campaign, picture)
             faults += judge(page, session)

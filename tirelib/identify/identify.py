@@ -9,7 +9,7 @@ import numpy as np
 from tirelib import __version__
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign, CampaignHeader
-from tirelib.errors import ParameterError, TirelibError
+from tirelib.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.discrepancy import COARSE, Discrepancy
 from tirelib.identify.estimate import Estimate
@@ -180,6 +180,8 @@ def start_file(
 
     Raises
     ------
+    CalibrationError
+        If neither the campaign nor the given tire states the lengths of the ring.
     ParameterError
         If there is no such base.
     """
@@ -208,6 +210,12 @@ def start_file(
             value = float(given)
             deviation = 0.05 * abs(value) if name == "innerliner_offset" else float("nan")
             numbers[name] = Number(value, deviation, "measured", f"{header.name}, campaign.toml")
+    if lacking := [f"{name}_m" for name in stated if name not in numbers]:
+        raise CalibrationError(
+            f"{header.name}: [tire] in campaign.toml does not state {', '.join(lacking)}; the ring "
+            "is fitted with these lengths; measure them at the tire and state them there, or give "
+            "a tire file that holds them (--tire)"
+        )
     if tire is not None:
         shift = pressure - tire.tire.pressure
         for prefix in ("radial", "tangential"):

@@ -233,6 +233,9 @@ class Desk:
         return self.jobs.add(kind, order, subject)
 
     def _open(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Open a folder, or look again at one that the session knows."""
+        if "campaign" in wish:
+            return {"campaign": self._begin(self.session.campaign(str(wish["campaign"]))).name}
         folder = intake.inside(
             str(wish.get("path", "")), [*self.roots, self.session.folder.resolve()]
         )

@@ -15,9 +15,15 @@ from tirelib.studio.disk import write_atomic
 from tirelib.studio.starter import RUNNER, Starter
 
 AT_ONCE = max(1, min(2, (os.cpu_count() or 1)))
-"""Jobs that run side by side; as many that the user asked for wait for none of the others."""
-ASKED = ("add", "remove", "plant", "next-test")
-"""Kinds that the user asks for and waits for; the others follow by themselves, or take long."""
+"""Jobs that run side by side, of those that the user waits for and of the others."""
+FIRST_VIEW = ("check", "show", "identify", "compare")
+READING = ("rig", "columns", "suggest", "import")
+ASKED = ("add", "remove", "plant", "next-test", *FIRST_VIEW, *READING)
+"""Kinds that the user waits for: they wait for none of the others, which take long, and have more
+of the processors than these."""
+NICE = 5
+"""By how much the others give way (`os.nice`): one of them beside a job that the user waits for on
+one processor has a quarter of it; with 2 it would have 0.4, with 10 a tenth."""
 TAIL = 4000
 """Characters of a failed command's last words that are kept."""
 MOST_ERRORS = 400
@@ -189,7 +195,8 @@ class Jobs:
     def _start(self, job: Job) -> None:
         place = self.place(job)
         files = {name: str(place / f"{name}.txt") for name in ("stdout", "stderr")}
-        self._starter.start(job.number, {"argv": job.argv, **files})
+        nice = 0 if job.kind in ASKED else NICE
+        self._starter.start(job.number, {"argv": job.argv, "nice": nice, **files})
         self.progress[job.number] = Progress()
         job.state, job.begun = "running", time.time()
         self._save(job)

@@ -3,9 +3,10 @@
     python -m tirelib.studio.runner
 
 It reads orders, a line of JSON each, from its standard input: `start`, a number, with `argv` of the
-program `tirelib` and the files for what that says; or `end`, the number of a job that has to end.
-On its standard output it says `job` with the `pid` of each that has begun, and with the `code` of
-each that has ended. Its input stays open while the server lives; when it ends, so do the jobs.
+program `tirelib`, by how much it gives way (`nice`), and the files for what it says; or `end`, the
+number of a job that has to end. On its standard output it says `job` with the `pid` of each that
+has begun, and with the `code` of each that has ended. Its input stays open while the server lives;
+when it ends, so do the jobs.
 """
 
 import json
@@ -112,6 +113,7 @@ class _Starter:
             warnings.simplefilter("ignore", DeprecationWarning)  # this process has one thread
             pid = os.fork()
         if not pid:
+            os.nice(order.get("nice", 0))
             self._work(order["argv"], files)
         self._jobs[pid] = order["start"]
         self._say(job=order["start"], pid=pid)

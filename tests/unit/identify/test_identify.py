@@ -10,6 +10,8 @@ import pytest
 
 from tests.synthetic import header
 from tests.unit.identify.model_waves import LOADS, TIRE, made_waves
+from tirelib.campaign.model import TireGeometry
+from tirelib.errors import CalibrationError
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.estimate import Estimate
 from tirelib.identify.identify import estimated, start_file
@@ -87,6 +89,14 @@ def test_the_start_is_geometry_then_literature(runs: StraightRuns) -> None:
     assert start.numbers["innerliner_offset"].std == pytest.approx(0.05 * 0.0033)
     assert np.isfinite(start.tire.extension_stiffness)
     assert start.tire.damping == 0.0
+
+
+def test_lengths_that_a_campaign_does_not_state_are_named(runs: StraightRuns) -> None:
+    bare = replace(header(), tire=TireGeometry("bare", 0.3165, ring_radius=0.302))
+    with pytest.raises(CalibrationError, match="state belt_width_m, tread_thickness_m, inn"):
+        start_file(bare, runs, None)
+    given = read_tire("table-6-1")
+    assert start_file(bare, runs, given).tire.belt_width == given.tire.belt_width
 
 
 def test_a_given_tire_is_moved_to_the_pressure_of_the_campaign(runs: StraightRuns) -> None:

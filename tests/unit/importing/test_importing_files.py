@@ -246,6 +246,28 @@ def test_a_draft_is_a_map_once_its_gaps_are_filled(
     }
 
 
+def test_an_english_file_is_drafted_with_the_column_that_numbers_its_runs(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    names = (
+        "Test No,Part,Time [ms],Wheel load [kN],Slip angle [deg],SG1 [um/m],SG2 [um/m],Index pulse"
+    )
+    rows = [f"{k // 4},{k % 3},{k},4.{k},0.{k},10{k},-1{k},{k % 2}" for k in range(9)]
+    file.write_text("\n".join([names, *rows]))
+    draft = tomllib.loads(suggest_map(file))
+    assert draft["run_column"] == "Test No"
+    assert {quantity: rule["unit"] for quantity, rule in draft["channels"].items()} == {
+        "time": "ms",
+        "Fz": "kN",
+        "slip_angle": "deg",
+        "strain_1": "um/m",
+        "strain_2": "um/m",
+        "trigger": "1",
+    }
+    back = [rows[8], *rows[:8]]  # numbers that go back count something else
+    file.write_text("\n".join([names, *back]))
+    assert "run_column" not in tomllib.loads(suggest_map(file))
+
+
 def test_a_german_file_is_drafted_with_what_the_rig_held(tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     names = (

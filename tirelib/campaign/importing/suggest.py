@@ -1,8 +1,8 @@
 """Content of a file, and a first draft of its map for known names.
 
 The names are those of the tire test consortium (FX, SA, IA, ...), of TYDEX (FYW, SLIPANGL, ...),
-of German rigs (Radlast, Schlupf, ...) and of a campaign itself. What the file does not say, the
-draft leaves open.
+of German rigs (Radlast, Schlupf, ...), English words (wheel load, SG1, ...) and those of a
+campaign itself. What the file does not say, the draft leaves open.
 """
 
 import json
@@ -79,8 +79,36 @@ KNOWN_NAMES: Mapping[str, str] = {
     "GESCHWINDIGKEIT": "speed",
     "DREHZAHL": "omega",
     "RADDREHZAHL": "omega",
+    "WHEELLOAD": "Fz",
+    "VERTICALLOAD": "Fz",
+    "VERTICALFORCE": "Fz",
+    "NORMALFORCE": "Fz",
+    "LATERALFORCE": "Fy",
+    "SIDEFORCE": "Fy",
+    "LONGITUDINALFORCE": "Fx",
+    "OVERTURNINGMOMENT": "Mx",
+    "ALIGNINGTORQUE": "Mz",
+    "ALIGNINGMOMENT": "Mz",
+    "SELFALIGNINGTORQUE": "Mz",
+    "CAMBERANGLE": "camber",
+    "INCLINATIONANGLE": "camber",
+    "LONGITUDINALSLIP": "slip_ratio",
+    "INFLATIONPRESSURE": "pressure",
+    "INFLPRESSURE": "pressure",
+    "TIREPRESSURE": "pressure",
+    "TYREPRESSURE": "pressure",
+    "BELTSPEED": "speed",
+    "ROADSPEED": "speed",
+    "DRUMSPEED": "speed",
+    "VELOCITY": "speed",
+    "INDEXPULSE": "trigger",
 }
-"""Column names of the field, in capitals, and their quantities; umlauts as two letters."""
+"""Column names of the field in capitals, without blanks and lines, and their quantities; umlauts as
+two letters."""
+GAGE_NAME = re.compile(r"(?:SG|DMS|GAGE|GAUGE|STRAIN|STRAINGAGE|STRAINGAUGE)0*([1-9]\d?)")
+"""Names of strain gages, of which each has a number."""
+RUN_NAMES = ("RUN", "RUNNO", "RUNNUMBER", "TEST", "TESTNO", "TESTNUMBER", "MESSUNG", "VERSUCH")
+"""Names of a column that numbers the runs, written as those of `KNOWN_NAMES`."""
 CONSTANT = ("pressure", "speed")
 """Quantities that a rig may hold; anything else that never changes was not connected."""
 _UMLAUTS = str.maketrans({"\u00c4": "AE", "\u00d6": "OE", "\u00dc": "UE"})
@@ -148,14 +176,41 @@ def quantity_of(name: str) -> str:
     --------
     >>> quantity_of("SA"), quantity_of("speed [km/h]"), quantity_of("strain_2"), quantity_of("X7")
     ('slip_angle', 'speed', 'strain_2', '')
+    >>> quantity_of("Slip angle [deg]"), quantity_of("SG1 [um/m]"), quantity_of("Wheel load [kN]")
+    ('slip_angle', 'strain_1', 'Fz')
     """
-    bare = re.sub(r"\s*[\[(].*[\])]$", "", name).rpartition(".")[2].rpartition("/")[2].strip()
+    bare = _bare(name)
     own = {quantity.casefold(): quantity for quantity in QUANTITIES if quantity != "load"}
     if bare.casefold() in own:
         return own[bare.casefold()]
     if strain_number(bare.casefold()) is not None or bare.endswith("_temperature"):
         return bare.casefold()
-    return KNOWN_NAMES.get(bare.upper().translate(_UMLAUTS), "")
+    plain = _plain(bare)
+    if gage := GAGE_NAME.fullmatch(plain):
+        return f"strain_{gage[1]}"
+    joined = {_plain(quantity): quantity for quantity in own.values()}
+    return KNOWN_NAMES.get(plain, joined.get(plain, ""))
+
+
+def _bare(name: str) -> str:
+    """Return a name without its unit and the groups that it stands in."""
+    return re.sub(r"\s*[\[(].*[\])]$", "", name).rpartition(".")[2].rpartition("/")[2].strip()
+
+
+def _plain(bare: str) -> str:
+    """Return a name in capitals, umlauts as two letters, without blanks, lines and dots."""
+    return re.sub(r"[\s_.-]", "", bare.upper().translate(_UMLAUTS))
+
+
+def _numbers_runs(item: ColumnSummary, values: FloatArray) -> bool:
+    """Whether a column numbers runs: by its name, and by whole numbers that never go back."""
+    steps = np.diff(values)
+    return bool(
+        _plain(_bare(item.name)) in RUN_NAMES
+        and np.all(values == np.round(values))
+        and (steps >= 0.0).all()
+        and (steps > 0.0).any()
+    )
 
 
 def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
@@ -191,6 +246,11 @@ def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
         f'axes = "{axes}"  # {reason}',
         f"name = {_quoted(Path(path).stem)}",
         'kind = "sweep"  # or the kind of steady runs, with [set_points]',
+        *[
+            f"run_column = {_quoted(item.name)}  # a guess: each of its numbers is a run"
+            for item in others
+            if _numbers_runs(item, table.columns[item.name].values)
+        ][:1],
         "",
         "[tire]",
         "# free_radius_m = ...  # required",
@@ -214,8 +274,9 @@ def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
 
 def _channel_line(quantity: str, item: ColumnSummary) -> str:
     dimension = dimension_of(quantity) or ""
-    fits = dimension in dimensions_of_unit(item.unit)
-    unit = item.unit if fits else ""
+    stated = item.unit or ("1" if quantity == "trigger" else "")  # a pulse has no unit
+    fits = dimension in dimensions_of_unit(stated)
+    unit = stated if fits else ""
     hint = "" if fits else f"state the unit of this {dimension}, "
     return (
         f"{quantity} = {{ column = {_quoted(item.name)}, unit = {_quoted(unit)} }}"

@@ -11,6 +11,9 @@ const DEFECTS = [["text", "text in a column of numbers", [["missing", "is a miss
 const SEPARATORS = [["", "found by itself"], [";", "semicolon"], [",", "comma"], ["\t", "tab"], ["|", "bar"], [" ", "blanks"]];
 const DECIMALS = [["", "found by itself"], [",", "comma: 1,5"], [".", "point: 1.5"]];
 
+// Lengths of the tire that a model of its strain needs: key of the map, and what it is.
+const LENGTHS = [["ring_radius_m", "ring radius: axle to the belt's neutral line"], ["tread_thickness_m", "tread thickness"], ["belt_width_m", "belt width"], ["innerliner_offset_m", "innerliner with the gages, from the belt's neutral line, inwards negative"]];
+
 const field = (value, label, size = 8) => h("input", { value: value ?? "", size, "aria-label": label });
 const select = (options, value, label, change = () => {}) => { const made = h("select", { "aria-label": label, onchange: () => change(made.value) }, options.map(([k, t]) => h("option", { value: k }, t))); made.value = value ?? ""; return made; };
 const amount = (text) => (String(text).trim() ? Number(String(text).trim().replace(",", ".")) : NaN);
@@ -100,12 +103,14 @@ export async function importForm(files, read = {}, before = new Map()) {
   if (!form.columns) { dialog("Import", h("p", { class: "bad said" }, form.message), h("p", {}, "State below how the file is to be read, or export it again."), how.element); return; }
   const { map, columns } = form, file = columns.files[0], taken = new Map(Object.entries(map?.channels || {}).map(([q, c]) => [c.column, [q, c]]));
   const name = field(map?.name, "name", 30), radius = field(map?.tire?.free_radius_m ? 1000 * map.tire.free_radius_m : "", "free radius in mm"), lateral = field("", "positions of the gages in mm", 26);
-  const axes = select(AXES, map?.axes, "axes"), runColumn = select([["", "each file is a run"], ...file.columns.map((c) => [c.name, c.name])], "", "run_column");
+  const lengths = LENGTHS.map(([key, text]) => ({ key, input: field(map?.tire?.[key] ? 1000 * map.tire[key] : "", `${key} in mm`), text }));
+  const tire = part("Lengths of the tire", `[tire] ${LENGTHS.map(([key]) => key).join(", ")}`, h("p", { class: "small quiet" }, "A model of the strain is fitted with these lengths. Without them the measurement is imported and shown, but no model is fitted to its strain."), h("table", {}, h("tbody", {}, lengths.map((one) => h("tr", {}, h("td", {}, one.text), h("td", {}, h("label", {}, one.input, " mm")))))));
+  const axes = select(AXES, map?.axes, "axes"), runColumn = select([["", "each file is a run"], ...file.columns.map((c) => [c.name, c.name])], map?.run_column, "run_column");
   const rows = file.columns.map((column) => columnRow(column, taken, () => update()));
   const measured = () => new Set(rows.map((r) => r.chosen.value).filter(Boolean)), gages = () => [...measured()].filter((q) => q.startsWith("strain_"));
   const set = points(measured, file.columns), steady = part("Set points of the runs", "[set_points]", h("p", { class: "small quiet" }, "Runs of the same set points are repeats; the noise is known from them. Round the means so far that repeats agree."), set.element);
   const kind = select(KINDS, map?.kind || "sweep", "kind", () => update()), strain = part("Gages", "[gages] lateral_m", h("label", {}, "Positions across the tire, from strain_1 on, with blanks between ", lateral, " mm"));
-  const update = () => { steady.hidden = kind.value === "sweep"; strain.hidden = !gages().length; set.update(); };
+  const update = () => { steady.hidden = kind.value === "sweep"; strain.hidden = tire.hidden = !gages().length; set.update(); };
   const said = h("p", { class: "bad said", role: "alert" }), sent = h("details", { hidden: true }, h("summary", {}, "The map that was sent"), h("pre", {}));
   const drawn = (faults) => {
     const channels = {};
@@ -116,9 +121,10 @@ export async function importForm(files, read = {}, before = new Map()) {
     if (!axes.value) faults.push("Choose the axis system of the files.");
     if (!(amount(radius.value) > 100)) faults.push("Give the free radius of the tire in mm, for instance 316.");
     if (!Object.keys(channels).length) faults.push("Choose at least one column.");
+    for (const one of gages().length ? lengths : []) if (one.input.value.trim() && !Number.isFinite(amount(one.input.value))) faults.push(`[tire] ${one.key}: give a number in mm, or leave it empty.`);
     const places = lateral.value.trim().split(/[\s;]+/).filter(Boolean).map(amount);
     if (gages().length && (places.length !== gages().length || !places.every(Number.isFinite))) faults.push(`[gages] lateral_m: give ${gages().length} positions in mm.`);
-    return { format: "tirelib-map/1", axes: axes.value, name: name.value || "imported", kind: kind.value, ...(runColumn.value ? { run_column: runColumn.value } : {}), ...how.drawn(), tire: { ...(map?.tire || {}), free_radius_m: amount(radius.value) / 1000 },
+    return { format: "tirelib-map/1", axes: axes.value, name: name.value || "imported", kind: kind.value, ...(runColumn.value ? { run_column: runColumn.value } : {}), ...how.drawn(), tire: { ...(map?.tire || {}), free_radius_m: amount(radius.value) / 1000, ...Object.fromEntries(lengths.filter((one) => gages().length && one.input.value.trim()).map((one) => [one.key, amount(one.input.value) / 1000])) },
       ...(gages().length ? { gages: { lateral_m: places.map((x) => x / 1000) } } : {}), ...(kind.value === "sweep" ? {} : { set_points: set.drawn(faults) }), channels };
   };
   const go = async () => {
@@ -139,12 +145,12 @@ export async function importForm(files, read = {}, before = new Map()) {
     });
   };
   dialog(`Import ${(form.names || []).join(", ")}`,
-    h("p", {}, "Usual names of columns are recognised. Check the axis system, the units, and give the free radius of the tire; leave out what does not belong to the measurement, and columns whose range is impossible (a turn rate or a rolling radius of a broken encoder)."),
+    h("p", {}, "Usual names of columns are recognised; choose the quantity of any other. Then: choose the axis system and the kind of runs, give the free radius of the tire, and check the units. Leave out what does not belong to the measurement, and columns whose range is impossible (a turn rate or a rolling radius of a broken encoder)."),
     form.message ? h("p", { class: "bad said" }, form.message) : null,
     part("Campaign", "name, axes, [tire] free_radius_m", h("div", { class: "row" }, h("label", {}, "Name ", name), h("label", {}, "Axes of the files ", axes), h("label", {}, "Free radius ", radius, " mm"))),
     part("Runs", "kind, run_column", h("div", { class: "row" }, h("label", {}, "Kind ", kind), h("label", {}, "A run is ", runColumn))), steady,
     part("Columns", "[channels]", h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["column", "range", "missing", "quantity", "unit", "factor"].map((t, i) => h("th", { class: i === 1 || i === 2 ? "n" : "" }, t)))), h("tbody", {}, rows.map((r) => r.element)))),
-      Object.entries(file.left_out || {}).map(([column, why]) => h("p", { class: "small warn" }, `Left out: ${column}: ${why}`))), strain,
+      Object.entries(file.left_out || {}).map(([column, why]) => h("p", { class: "small warn" }, `Left out: ${column}: ${why}`))), strain, tire,
     h("details", { open: Boolean(Object.keys(read).length) || Object.values(file.left_out || {}).some((why) => why.includes("text =")) }, h("summary", {}, "How the files are read"), (file.notes || []).map((note) => h("p", { class: "small quiet" }, note)), how.element),
     said, h("button", { class: "main", type: "button", id: "import", onclick: go }, "Import"), sent);
   restore(before);

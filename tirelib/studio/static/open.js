@@ -101,7 +101,7 @@ export class Open {
       broken.map((job) => h("p", { class: "warn" }, `${job.title}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: async () => { if (await wish({ do: "again", job: job.job })) app.follow = null; } }, "Run again"))));
     const c = app.campaign;
     if (!c) { fill(this.facts); this.shownFor = ""; return; }
-    const key = JSON.stringify([c.campaign, c.stale, c.check, c.shown, c.models.length, c.jobs.map((j) => j.state)]);
+    const key = JSON.stringify([c.campaign, c.stale, c.check, c.shown, c.measured, c.models.length, c.jobs.map((j) => j.state)]);
     if (key === this.shownFor) return;
     this.shownFor = key;
     this.campaign(c);
@@ -113,14 +113,16 @@ export class Open {
     if (!check) findings.append(h("p", { class: "quiet" }, "The campaign is being checked."));
     else if (!check.problems.length) findings.append(h("p", { class: "good" }, "The check found nothing wrong."));
     else {
-      findings.append(h("p", {}, `${check.errors} ${check.errors === 1 ? "error" : "errors"}, ${check.warnings} ${check.warnings === 1 ? "warning" : "warnings"}. ${check.errors ? "No model is fitted before the errors are corrected." : ""}`),
+      findings.append(h("p", {}, check.errors ? h("button", { type: "button", id: "check-again", onclick: () => wish({ do: "open", campaign: c.campaign }) }, "Check again") : null, ` ${check.errors} ${check.errors === 1 ? "error" : "errors"}, ${check.warnings} ${check.warnings === 1 ? "warning" : "warnings"}. ${check.errors ? "No model is fitted before the errors are corrected: mend the files, then check again." : ""}`.trimEnd()),
         h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["", "where", "what was found", "what to do"].map((t) => h("th", {}, t)))),
           h("tbody", {}, check.problems.map((p) => h("tr", {}, h("td", { class: p.severity === "error" ? "bad" : "warn" }, p.severity), h("td", {}, p.where), h("td", {}, `${p.given}. Allowed: ${p.allowed}`), h("td", {}, p.remedy)))))));
     }
-    const failed = c.jobs.filter((job) => ["failed", "interrupted", "cancelled"].includes(job.state)).slice(-4);
+    // runs that cannot be read are among the findings
+    const failed = c.jobs.filter((job) => ["failed", "interrupted", "cancelled"].includes(job.state) && !(job.kind === "show" && check?.errors)).slice(-4);
     const ready = c.models.some((m) => m.ready);
-    const next = h("div", { class: "row" }, h("button", { class: "main", type: "button", disabled: !ready, onclick: () => this.go("see") }, "See where the model fails"),
-      ready ? null : h("span", { class: "quiet" }, check?.errors ? "There is no model: correct the errors first." : "The base model is being fitted."));
+    const seen = ready || c.measured, unfitted = failed.some((job) => job.kind === "identify");
+    const next = h("div", { class: "row" }, h("button", { class: "main", type: "button", disabled: !seen, onclick: () => this.go("see") }, ready || !seen ? "See where the model fails" : "See what was measured"),
+      ready ? null : h("span", { class: "quiet" }, !check ? "The campaign is being checked." : check.errors ? "There is no model: correct the errors first." : unfitted ? "The base model could not be fitted." : "The base model is being fitted."));
     const troubles = failed.map((job) => h("p", { class: job.state === "failed" ? "bad" : "warn" }, `${job.title}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: job.job }) }, "Run again")));
     fill(this.facts, h("div", { class: "card" }, h("h2", {}, c.title), h("p", { class: "quiet small" }, c.folder),
       c.stale ? h("p", { class: "warn" }, "The measurements have changed since the models were fitted; the models and their errors belong to the old ones. ", h("button", { class: "small", type: "button", onclick: () => wish({ do: "fit", campaign: c.campaign }) }, "Fit a new base model")) : null, next, troubles), findings);

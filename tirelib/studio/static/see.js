@@ -243,8 +243,8 @@ export function wait(place, kinds = ["check", "identify", "compare"]) {
     wish({ do: "look", campaign: c.campaign, model: model.number, quantity: c.quantity });
   }
   fill(place, h("h2", {}, running.length ? "Being computed" : broken ? "It could not be computed" : "Nothing to be seen yet"),
-    running.length && !model ? h("p", { class: "quiet" }, "The campaign is checked, then the base model is fitted to it and compared with it. For 66 runs that takes about 15 s on an idle machine; the page then shows it by itself. What was measured needs no model: it appears below as soon as the runs are read.") : null,
-    c.check?.errors ? h("p", { class: "bad" }, `The campaign has ${c.check.errors} errors; they stand in step 1 with what to do.`) : null,
+    running.length && !model ? h("p", { class: "quiet" }, "The campaign is checked, then the base model is fitted to it and compared with it. For 66 runs that takes about 15 s on an idle machine; the page then shows it by itself. What was measured needs no model: step 2 shows it as soon as the runs are read.") : null,
+    c.check?.errors ? h("p", { class: "bad" }, `The campaign has ${c.check.errors} ${c.check.errors === 1 ? "error" : "errors"}: `, h("a", { href: `#/open/${c.campaign}` }, "step 1 lists them with what to do"), ".") : null,
     running.map((job) => { const at = progressOf(job.job); return h("p", {}, `${job.title}: ${job.state === "running" ? labelOf(at) || "begins" : "waits"}`); }),
     !running.length && broken ? [h("p", { class: "bad" }, `${broken.title}: ${broken.state}. ${broken.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: broken.job }) }, "Run again")), ways(c, model)] : null);
 }

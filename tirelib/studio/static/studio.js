@@ -104,7 +104,8 @@ listen((what) => {
     if (app.home.first && !address().campaign) { go("see", app.home.first); return; }
   }
   for (const job of [...(app.campaign?.jobs || []), ...app.home.jobs]) {
-    if (job.state === "failed" && job.ended > begun && !told.has(job.job)) { told.add(job.job); toast(`${job.title}: ${job.message}`, true); }
+    const found = job.kind === "show" && app.campaign?.check?.errors; // it is among the findings
+    if (job.state === "failed" && !found && job.ended > begun && !told.has(job.job)) { told.add(job.job); toast(`${job.title}: ${job.message}`, true); }
   }
   if (app.follow && app.home) {
     const found = app.home.jobs.find((job) => job.job === app.follow);
