@@ -150,6 +150,13 @@ def test_a_worker_that_starts_slowly_again_is_not_given_up() -> None:
     assert second != first
 
 
+def test_an_interrupt_of_the_terminal_ends_no_worker() -> None:
+    with engine.cluster(None, 1) as client:
+        (first,) = client.run(os.getpid).values()
+        os.kill(first, signal.SIGINT)
+        assert client.submit(os.getpid, pure=False).result(timeout=PATIENCE) == first
+
+
 def test_a_worker_keeps_no_call_stacks_of_what_it_did() -> None:
     """The profiler of Dask would let it grow by the second."""
 

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import signal
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import dask.config
 import pyarrow.dataset as pads
-from distributed import Client, Future, LocalCluster, as_completed
+from distributed import Client, Future, LocalCluster, WorkerPlugin, as_completed
 
 from tirelib import __version__
 from tirelib.errors import FormatError, ParameterError
@@ -68,6 +69,13 @@ class Counts:
         return (self.done + self.failed + self.known) / max(time.monotonic() - self.began, 1e-9)
 
 
+class _OnlyTheClientIsInterrupted(WorkerPlugin):
+    """A terminal sends `Ctrl-C` to workers as well, which would end with a traceback each."""
+
+    def setup(self, worker: object) -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 class SchedulerLostError(FormatError):
     """The scheduler went away; what was finished is kept."""
 
@@ -93,6 +101,7 @@ def cluster(address: str | None, workers: int | None) -> Iterator[Client]:
             ) as local,
             Client(local) as client,
         ):
+            client.register_plugin(_OnlyTheClientIsInterrupted())
             yield client
         return
     try:
