@@ -40,6 +40,7 @@ from tirelib.cli.fleet import run_verb  # noqa: E402
 from tirelib.estimators.calibration_file import write_calibration  # noqa: E402
 from tirelib.estimators.train import train  # noqa: E402
 from tirelib.fleet import engine, work  # noqa: E402
+from tirelib.fleet.cluster import cluster  # noqa: E402
 from tirelib.fleet.dataset import DataSet  # noqa: E402
 from tirelib.fleet.sources import Source, find_sources  # noqa: E402
 from tirelib.observations import observe  # noqa: E402
@@ -160,7 +161,7 @@ def memory(folder: Path, counts: Sequence[int]) -> None:
     """Peak memory of client with scheduler, and of a worker, over the number of campaigns."""
     for count in counts:
         paths = campaigns(folder, count)
-        with engine.cluster(None, 2) as client:
+        with cluster(None, 2) as client:
             watch = Peak(client)
             watch.start()
             began = time.monotonic()
@@ -195,7 +196,7 @@ def scheduler(folder: Path, counts: Sequence[int]) -> None:
     engine.fingerprint = lambda source: source.url
     for count in counts:
         sources = [Source(f"/nowhere/{k:06d}", True) for k in range(count)]
-        with engine.cluster(None, 2) as client:
+        with cluster(None, 2) as client:
             workers_before, before, began = _processor(client), _spent(), time.monotonic()
             counts = _check(sources, folder / f"out-{count}", client)
             wall, own = time.monotonic() - began, _spent() - before
@@ -223,7 +224,7 @@ def workers(folder: Path, count: int) -> None:
     walls: dict[int, list[float]] = {1: [], 2: []}
     for number in (1, 2, 2, 1, 1, 2):
         out = folder / f"out-{number}-{time.monotonic_ns()}"
-        with engine.cluster(None, number) as client:
+        with cluster(None, number) as client:
             data = DataSet(str(out))
             data.open()
             recipe = engine.recipe_of("estimate", data, files={"calibration": str(known)})
@@ -249,7 +250,7 @@ def endurance(folder: Path, minutes: float) -> None:
     until, kills, rounds = time.monotonic() + 60.0 * minutes, 0, 0
     while time.monotonic() < until:
         out = folder / f"out-{rounds}"
-        with engine.cluster(None, 2) as client:
+        with cluster(None, 2) as client:
             last = time.monotonic()
 
             def kill(counts: engine.Counts, client: Client = client) -> None:

@@ -14,7 +14,7 @@ from distributed.cli.dask_scheduler import main as dask_scheduler
 from distributed.cli.dask_worker import main as dask_worker
 
 from tirelib.cli.fleet import fleet
-from tirelib.fleet.engine import NO_PROFILER
+from tirelib.fleet.cluster import NO_PROFILER
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "howto" / "fleet"

@@ -19,7 +19,8 @@ from distributed import Client, LocalCluster
 
 from tests.synthetic import synthetic_run, write
 from tirelib.cli.fleet import run_verb
-from tirelib.fleet import engine
+from tirelib.errors import FormatError
+from tirelib.fleet import cluster, engine
 from tirelib.fleet.dataset import DataSet
 from tirelib.fleet.engine import Counts, SchedulerLostError
 from tirelib.fleet.sources import find_sources
@@ -65,8 +66,8 @@ def test_a_killed_worker_loses_nothing(many: Path, tmp_path: Path) -> None:
             processes=True,
             dashboard_address=":0",
             silence_logs=50,
-        ) as cluster,
-        Client(cluster) as client,
+        ) as local,
+        Client(local) as client,
     ):
         counts = run(many, tmp_path / "out", client, kill)
     assert killed
@@ -108,7 +109,7 @@ def test_a_killed_scheduler_and_then_the_same_again(
             if counts.done:
                 process.kill()
 
-        with engine.cluster(address, None) as first:
+        with cluster.cluster(address, None) as first:
             first.wait_for_workers(1, timeout=PATIENCE)
             with pytest.raises(SchedulerLostError, match="the scheduler went away"):
                 run(many, out, first, kill)
@@ -142,7 +143,7 @@ def test_a_killed_client_and_then_the_same_again(
 def test_a_worker_that_starts_slowly_again_is_not_given_up() -> None:
     with (
         dask.config.set({"distributed.deploy.lost-worker-timeout": "0s"}),
-        engine.cluster(None, 1) as client,
+        cluster.cluster(None, 1) as client,
     ):
         (first,) = client.run(os.getpid).values()
         os.kill(first, signal.SIGKILL)
@@ -151,7 +152,7 @@ def test_a_worker_that_starts_slowly_again_is_not_given_up() -> None:
 
 
 def test_an_interrupt_of_the_terminal_ends_no_worker() -> None:
-    with engine.cluster(None, 1) as client:
+    with cluster.cluster(None, 1) as client:
         (first,) = client.run(os.getpid).values()
         os.kill(first, signal.SIGINT)
         assert client.submit(os.getpid, pure=False).result(timeout=PATIENCE) == first
@@ -164,15 +165,15 @@ def test_a_worker_keeps_no_call_stacks_of_what_it_did() -> None:
         callbacks = dask_worker.periodic_callbacks  # type: ignore[attr-defined]
         return "profile" in callbacks, len(dask_worker.io_loop.profile)  # type: ignore[attr-defined]
 
-    with engine.cluster(None, 1) as client:
+    with cluster.cluster(None, 1) as client:
         (found,) = client.run(stacks).values()
     assert found == (False, 0)
 
 
 def test_no_scheduler_at_the_address_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine, "CONNECT", 0.5)
+    monkeypatch.setattr(cluster, "CONNECT", 0.5)
     with (
-        pytest.raises(engine.FormatError, match="no scheduler answers"),
-        engine.cluster("tcp://127.0.0.1:9", None),
+        pytest.raises(FormatError, match="no scheduler answers"),
+        cluster.cluster("tcp://127.0.0.1:9", None),
     ):
         pass

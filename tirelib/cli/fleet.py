@@ -127,6 +127,7 @@ def fleet(
 ) -> None:
     """Run TASK over every campaign and recording below PATHS, on Dask."""
     from tirelib.fleet import engine
+    from tirelib.fleet.cluster import cluster
     from tirelib.fleet.dataset import DataSet
     from tirelib.fleet.page import write_fleet_page
     from tirelib.fleet.sources import find_sources
@@ -145,7 +146,7 @@ def fleet(
     )
     console = output()
     stopped = ""
-    with engine.cluster(scheduler, workers) as client:
+    with cluster(scheduler, workers) as client:
         click.echo(f"Dask dashboard: {client.dashboard_link}", err=True)
         if not client.nthreads():
             click.echo("Warning: no worker has joined; the work begins with the first", err=True)
