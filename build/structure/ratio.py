@@ -17,7 +17,8 @@ from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.delay import by_delay
 from tirelib.identify.identify import estimated
 from tirelib.identify.random_effects import Whitening, scales, tangents, whitening_of
-from tirelib.model.solution import slopes_of, solved
+from tirelib.model.slopes import slopes_of
+from tirelib.model.solution import solved
 from tirelib.waveforms import Waveforms
 
 DELAY_STD = 1.0

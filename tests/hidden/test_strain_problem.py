@@ -60,6 +60,21 @@ def test_one_start_is_a_tire_as_the_literature_has_it(problem: StrainProblem) ->
     assert other.base[-1] == 0.0
 
 
+def test_fits_of_many_runs_begin_with_a_quarter_that_spans_their_conditions(
+    problem: StrainProblem,
+) -> None:
+    assert problem.thinned() is problem  # 15 runs are few
+    many = problem._of(np.tile(np.arange(len(problem.data.points)), 6))
+    part = many.thinned()
+    few, whole = part.data.points, many.data.points
+    assert len(few) == len(whole) // 4 == len(part.noise) == part.present
+    assert part.living == problem.living
+    assert part.start is problem.start
+    for name in ("load", "omega", "pressure"):
+        assert np.ptp(getattr(few, name)) > 0.7 * np.ptp(getattr(whole, name))
+    assert part.solve(part.start).rest.shape == (len(few), GRID.size)
+
+
 def spun(problem: StrainProblem) -> FloatArray:
     """Return rho A R^2 Omega^2, (n_runs,), [N]."""
     values, omega = problem.values, problem.data.points.omega

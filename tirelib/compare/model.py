@@ -11,7 +11,8 @@ from tirelib.effects import CATALOGUE, Effect
 from tirelib.errors import CalibrationError, FormatError, ParameterError, TirelibError
 from tirelib.model.base import predict, values_of
 from tirelib.model.chain import Change, Changes
-from tirelib.model.solution import slopes_of, solved
+from tirelib.model.slopes import slopes_of
+from tirelib.model.solution import solved
 from tirelib.model.state import Operating, State
 from tirelib.parameters import TireFile
 from tirelib.rolling.solve import Start

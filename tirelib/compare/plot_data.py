@@ -32,7 +32,8 @@ from tirelib.identify.random_effects import scales, whitening_of
 from tirelib.identify.span import span
 from tirelib.model.base import coordinates, linearised, operating_points, predict
 from tirelib.model.chain import Changes
-from tirelib.model.solution import by_values, solved
+from tirelib.model.slopes import by_values
+from tirelib.model.solution import solved
 from tirelib.model.state import Operating
 from tirelib.parameters import TireFile
 from tirelib.quantities import QUANTITIES

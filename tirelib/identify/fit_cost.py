@@ -19,7 +19,8 @@ from tirelib.campaign import Tolerance
 from tirelib.identify.delay import STD, UNIT, by_delay
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.random_effects import Whitening, scales, tangents, whitening_of
-from tirelib.model.solution import Solution, SolutionSlopes
+from tirelib.model.slopes import SolutionSlopes
+from tirelib.model.solution import Solution
 from tirelib.model.state import Operating
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID

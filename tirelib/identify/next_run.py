@@ -26,7 +26,8 @@ from tirelib.identify.fit_cost import nuisance_shapes
 from tirelib.identify.laboratory import Test, laboratory_tests
 from tirelib.identify.random_effects import scales, tangents, whitening_of
 from tirelib.identify.waveform_fit import WaveformFit
-from tirelib.model.solution import Solution, SolutionSlopes, slopes_of, solved
+from tirelib.model.slopes import SolutionSlopes, slopes_of
+from tirelib.model.solution import Solution, solved
 from tirelib.model.state import Operating
 
 BELOW, ABOVE = 0.8, 1.2

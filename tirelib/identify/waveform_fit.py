@@ -23,7 +23,8 @@ from tirelib.identify.fit_cost import Cost, Data
 from tirelib.identify.random_effects import Whitening
 from tirelib.model.base import FREE, Coordinate, Linear, move
 from tirelib.model.chain import Changes
-from tirelib.model.solution import Solution, SolutionSlopes, slopes_of, solved
+from tirelib.model.slopes import SolutionSlopes, slopes_of
+from tirelib.model.solution import Solution, solved
 
 __all__ = ["Data", "Prior", "Solver", "WaveformFit", "fit_waveforms"]
 

@@ -157,6 +157,10 @@ class ForceProblem:
         """Return the brush's constants at a point."""
         return moved_constants(self.values, self.names, point.base)
 
+    def thinned(self) -> "ForceProblem":
+        """Return the problem itself: a fit to forces costs little."""
+        return self
+
     def about(self, solved: ForceSolved) -> "ForceProblem":
         """Return the problem: its whitening stays about the given model."""
         return self

@@ -95,6 +95,12 @@ class Problem(Protocol):
     def about(self, solved: Any) -> "Problem":
         """Return the problem with its whitening about a solution; itself where it is."""
 
+    def thinned(self) -> "Problem":
+        """Return the problem of a part of the measurement, where fits begin; itself if it is small.
+
+        It has the same coordinates and effects.
+        """
+
     def solve(self, point: Point, near: Any = None) -> Solved:
         """Return the model at a point; raises TirelibError where it has none."""
 

@@ -13,6 +13,7 @@ there.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -215,6 +216,10 @@ class Hypotheses:
         fits = partial(
             posterior, effects=self.had, spread=self.spread, own=self.own, progress=progress
         )
+        part = problem.thinned()
+        if part is not problem:
+            with suppress(TirelibError):  # the whole problem says what is wrong
+                start = fits(part, start=start, settled=ROUGH).point
         try:
             fit = fits(problem, start=start, settled=ROUGH)
             for _ in range(ROUNDS):

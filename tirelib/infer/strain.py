@@ -24,13 +24,8 @@ from tirelib.infer.whiten import INSIDE, Whitener
 from tirelib.model import solution
 from tirelib.model.base import coordinates, move
 from tirelib.model.chain import Changes
-from tirelib.model.solution import (
-    Solution,
-    SolutionSlopes,
-    added_by_values,
-    by_effects,
-    by_values,
-)
+from tirelib.model.slopes import SolutionSlopes, added_by_values, by_effects, by_values
+from tirelib.model.solution import Solution
 from tirelib.model.state import Operating, State
 from tirelib.rolling.assemble import Unknowns
 from tirelib.rolling.solve import Rolling
@@ -71,6 +66,8 @@ FOLLOWED = 0.003
 """Change of the waveforms, over the strain, below which a whitening need not follow a fit. A base
 that lacks an effect is then as likely from any start: with a stiffness a quarter off, its cost is
 4626, 4623 and 4661; with .01 it is 4626, 4474 and 5026."""
+FEW = 15
+"""Runs with which a fit may begin: the others only make it more accurate."""
 UNKNOWN_NOISE = 0.005
 """Noise over the rms strain where there are no repeats."""
 
@@ -291,6 +288,22 @@ class StrainProblem:
         start : Point
             The model.
         """
+        out = self._of(chosen)
+        out.start, out.living = start, ()
+        return out
+
+    def thinned(self) -> "StrainProblem":
+        """Return the problem of a quarter of the runs, drawn at random; itself if they are few."""
+        count = len(self.data.points)
+        if count < 2 * FEW:
+            return self
+        chosen = np.zeros(count, dtype=bool)
+        drawn = np.random.default_rng(0).permutation(count)
+        chosen[drawn[: max(FEW, count // 4)]] = True
+        return self._of(chosen)
+
+    def _of(self, chosen: BoolArray) -> "StrainProblem":
+        """Return the problem of some of the runs, with the same start and effects."""
         data, out = self.data, copy(self)
         out.data = replace(
             data,
@@ -300,7 +313,7 @@ class StrainProblem:
             deflection=data.deflection[chosen],
         )
         out.noise, out._scale = self.noise[chosen], self._scale[chosen]
-        out.start, out.living, out.present = start, (), int(chosen.sum())
+        out.present = int(chosen.sum())
         out.forget()
         out.reference, out._whiteners = self.reference.take(chosen), {}
         return out
@@ -396,10 +409,9 @@ class StrainProblem:
         for k, effect in enumerate(point.effects):
             for j in range(effect.components):
                 steps.append(LEAST_STEP * effect.toward)
-                strengths = [s.copy() for s in point.strengths]
-                strengths[k][j] += steps[-1]
-                moved = _changes(replace(point, strengths=tuple(strengths)))
-                there.append((effect.hook, moved))
+                strength = point.strengths[k].copy()
+                strength[j] += steps[-1]
+                there.append((k, effect.at(_numbers(strength))))
         rows = np.zeros((0, *solved.waveform.shape))
         if there:
             rows = by_effects(solved.model, there, steps).waveform * self._scales(point.effects)
@@ -416,7 +428,7 @@ class StrainProblem:
     def signature(self, solved: StrainSolved, effect: Effect) -> FloatArray:
         """Return changes (components, n_runs, n_phi) for a strength of one range."""
         changes = solved.model.changes
-        there = [(effect.hook, [*changes, effect.at(trial)]) for trial in effect.trials]
+        there = [(len(changes), effect.at(trial)) for trial in effect.trials]
         steps = [effect.step] * effect.components
         rows = by_effects(solved.model, there, steps).waveform * effect.scale
         return earlier(rows, self.data.points.omega, -solved.delay)
@@ -470,6 +482,10 @@ def _with_changes(
 
 def _changes(point: Point) -> Changes:
     return [
-        effect.at(float(s[0]) if effect.components == 1 else tuple(float(x) for x in s))
-        for effect, s in zip(point.effects, point.strengths, strict=True)
+        effect.at(_numbers(s)) for effect, s in zip(point.effects, point.strengths, strict=True)
     ]
+
+
+def _numbers(strength: FloatArray) -> float | tuple[float, ...]:
+    """Return a strength as effects take it."""
+    return float(strength[0]) if strength.size == 1 else tuple(strength.tolist())

@@ -38,9 +38,9 @@ def law_errors(
 ) -> FloatArray:
     """Return errors of a law, each as large as what the effect does.
 
-    The effect goes otherwise with load, pressure, speed and time; acts a little further ahead or
-    behind, and more or less sharply; and smooth shapes round the turn, as large as the rows are in
-    that run, are added, constant or going with load or speed.
+    The effect goes otherwise with load, pressure, speed and time, by a slope and by a curvature;
+    acts a little further ahead or behind, and more or less sharply; and smooth shapes round the
+    turn, as large as the rows are in that run, are added, constant or going with load or speed.
 
     Parameters
     ----------
@@ -65,7 +65,8 @@ def law_errors(
         ]
     )
     conditions = conditions - conditions[:, :present].mean(axis=1, keepdims=True)
-    otherwise = GOES * (conditions[:, None, :, None] * rows[None]).reshape(-1, *rows.shape[1:])
+    goes = np.concatenate([conditions, _bent(conditions, present)])
+    otherwise = GOES * (goes[:, None, :, None] * rows[None]).reshape(-1, *rows.shape[1:])
     square = np.sum(rows**2, axis=0)
     mean = np.mean(square, axis=1, keepdims=True)
     size = np.sqrt(0.5 * mean + 0.5 * _nearby(square, half_angle))
@@ -141,6 +142,17 @@ def as_large(rows: FloatArray, ranges: FloatArray) -> FloatArray:
     together = float(np.sqrt(np.mean(np.tensordot(ranges, rows, axes=1) ** 2)))
     own = np.sqrt(np.mean(rows**2, axis=tuple(range(1, rows.ndim)), keepdims=True))
     return np.asarray(rows * (together / own))
+
+
+def _bent(conditions: FloatArray, present: int) -> FloatArray:
+    """Return the squares of conditions (n, n_runs), with the spread that each condition has.
+
+    A law that levels off, where the effect's law goes on, differs by a curvature.
+    """
+    here = conditions[:, :present]
+    spread = here.std(axis=1, keepdims=True)
+    square = np.divide(conditions**2, spread, out=np.zeros_like(conditions), where=spread > 0.0)
+    return np.asarray(0.5 * (square - spread))
 
 
 def _elsewhere(rows: FloatArray, half_angle: FloatArray) -> tuple[FloatArray, FloatArray]:

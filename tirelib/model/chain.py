@@ -7,6 +7,7 @@ gage                            the waveform that the gage and its filter give
 """
 
 from collections.abc import Callable, Sequence
+from itertools import takewhile
 
 import numpy as np
 
@@ -22,6 +23,8 @@ STAGES = ("constants", "contact", "strain", "gage")
 Change = Callable[[State], State]
 Changes = Sequence[tuple[str, Change]]
 """Stage and change, in the order in which they act."""
+Course = Sequence[tuple[Change, State]]
+"""Changes in the order in which they act, each with the state after it."""
 
 N_MODES = 60
 N_NODES = 24
@@ -83,11 +86,28 @@ def pressed(state: State, changes: Changes) -> State:
 
 def strained(state: State, changes: Changes, low_pass: LowPass) -> State:
     """Return a pressed state with the filtered waveform that effects at the gage act on."""
-    solved = apply(state, changes, "contact")
-    assert solved.belt is not None  # noqa: S101 - a pressed state has it
-    solved = solved.but(strain=strain_harmonics(solved.belt, solved.radius, solved.offset))
-    solved = apply(solved, changes, "strain")
-    return solved.but(waveform=_filtered(solved, low_pass))
+    return filtered(course(state, changes)[-1][1], low_pass)
+
+
+def course(state: State, changes: Changes, known: Course = ()) -> list[tuple[Change, State]]:
+    """Return every change from the pressed state to the strain, with the state after it.
+
+    `known` is the course of other changes from the same state: states up to the first change that
+    differs are taken from there.
+    """
+    contact, strain = ([c for at, c in changes if at == stage] for stage in ("contact", "strain"))
+    every = [*contact, _with_strain, *strain]
+    same = list(takewhile(lambda pair: pair[0] is pair[1][0], zip(every, known, strict=False)))
+    out = [each for _, each in same]
+    for change in every[len(out) :]:
+        state = change(out[-1][1] if out else state)
+        out.append((change, state))
+    return out
+
+
+def _with_strain(state: State) -> State:
+    assert state.belt is not None  # noqa: S101 - a pressed state has it
+    return state.but(strain=strain_harmonics(state.belt, state.radius, state.offset))
 
 
 def crossing(
@@ -136,7 +156,12 @@ def apply(state: State, changes: Changes, stage: str) -> State:
     return state
 
 
-def _filtered(state: State, low_pass: LowPass) -> FloatArray:
+def filtered(state: State, low_pass: LowPass) -> State:
+    """Return a state with strain with the waveform that the low-pass filter leaves of it."""
+    return state.but(waveform=_waveform(state, low_pass))
+
+
+def _waveform(state: State, low_pass: LowPass) -> FloatArray:
     """Return the strain as the signal chain gives it: Gaussian low-pass, mean over the turn off."""
     assert state.strain is not None  # noqa: S101 - set by the caller
     n = np.arange(1, state.strain.shape[1])

@@ -21,7 +21,8 @@ from tirelib.effects import CATALOGUE
 from tirelib.errors import CalibrationError, ParameterError
 from tirelib.identify.delay import by_delay
 from tirelib.model.base import coordinates, operating_points
-from tirelib.model.solution import by_values, solved
+from tirelib.model.slopes import by_values
+from tirelib.model.solution import solved
 from tirelib.parameters import Number
 from tirelib.waveforms import measure_waveforms
 

@@ -20,7 +20,7 @@ from tirelib.identify.waveform_fit import (
     fit_waveforms,
 )
 from tirelib.model.base import BARE, FREE, Coordinate, predict, values_of
-from tirelib.model.solution import slopes_of
+from tirelib.model.slopes import slopes_of
 from tirelib.waveforms import GRID
 
 NOISE = 4e-5

@@ -75,6 +75,9 @@ class Toy:
     def whitener(self, own: float) -> "Louder":
         return Louder(own)
 
+    def thinned(self) -> "Toy":
+        return self
+
     def about(self, solved: Any) -> "Toy":
         return self
 

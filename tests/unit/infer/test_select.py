@@ -190,3 +190,36 @@ def test_the_base_is_the_best_fit_of_those_from_all_starts(starts: tuple[float, 
     assert stuck.point.base[0] == pytest.approx(-1.0, abs=0.1)
     assert best.point.base[0] == pytest.approx(2.71, abs=0.1)
     assert best.cost < 0.1 * stuck.cost
+
+
+class Parted(Valleys):
+    """Has a part in which fits begin: its own start stands in the valley of the best fit."""
+
+    def __init__(self, *, solved: bool) -> None:
+        super().__init__(-1.5)
+        self.solved = solved
+        self.began: list[float] = []
+
+    def thinned(self) -> Toy:
+        part = Valleys(-1.5)
+        if not self.solved:
+            part.solve = refuse  # type: ignore[method-assign]
+        part.measured = part.measured - 14.0 * part.base[0]
+        return part
+
+    def solve(self, point: Point, near: Any = None) -> Solved:
+        self.began.append(float(point.base[0]))
+        return super().solve(point, near)
+
+
+def refuse(point: Point, near: Any = None) -> Solved:
+    raise ParameterError("the part: no solution; use the whole")
+
+
+@pytest.mark.parametrize("solved", [True, False])
+def test_a_fit_begins_where_that_of_a_part_ended(solved: bool) -> None:
+    whole = Parted(solved=solved)
+    Hypotheses(whole, FAMILIES)
+    # z^3 - 3 z is -2 for the part, at z = -2
+    first = next(z for z in whole.began[1:] if z != whole.began[0]) if solved else whole.began[1]
+    assert first == pytest.approx(-2.0 if solved else -1.5, abs=0.1)

@@ -38,7 +38,7 @@ def test_an_effect_may_act_a_little_ahead(share: float) -> None:
     errors = law_errors(BUMP[None], HALF, POINTS, 3)
     moved = np.exp(-0.5 * ((GRID + share * HALF[:, None]) / (0.5 * HALF[:, None])) ** 2)
     # two terms of a Taylor series in the half contact are among the errors
-    terms = errors[4:6] / PLACED
+    terms = errors[8:10] / PLACED
     assert moved - BUMP == pytest.approx(share * terms[0] + share**2 * terms[1], abs=1e-3)
     assert share_outside(moved - BUMP, terms) < 0.02
 
@@ -48,13 +48,24 @@ def test_an_effect_may_be_sharper() -> None:
     sharper = np.exp(-0.5 * (GRID / (0.45 * HALF[:, None])) ** 2) / 0.9
     assert share_outside(sharper - BUMP, errors) < 0.15
     # without the two terms other shapes have to stand for it
-    assert share_outside(sharper - BUMP, errors[4:6]) < 0.3
+    assert share_outside(sharper - BUMP, errors[8:10]) < 0.3
 
 
 def test_an_effect_may_go_otherwise_with_load_about_its_mean() -> None:
     with_load = law_errors(BUMP[None], HALF, POINTS, 3)[0]
     factor = np.log(LOAD) - np.log(LOAD).mean()
     assert with_load == pytest.approx(GOES * factor[:, None] * BUMP)
+
+
+def test_an_effect_may_level_off_with_load() -> None:
+    load = np.linspace(2000.0, 6000.0, 9)
+    half = np.full(9, 0.15)
+    rows = np.exp(-0.5 * (GRID / (0.5 * half[:, None])) ** 2)
+    errors = law_errors(rows[None], half, operating(load, np.full(9, 2.2e5)), 9)
+    levels_off = np.tanh((load - 2500.0) / 1000.0)[:, None] * rows
+    slope = share_outside(levels_off, np.stack([rows, errors[0]]))
+    curvature = share_outside(levels_off, np.stack([rows, errors[0], errors[4]]))
+    assert curvature < 0.5 * slope
 
 
 def test_errors_of_runs_ahead_count_from_the_mean_of_those_that_are_measured() -> None:

@@ -13,16 +13,8 @@ from tirelib.effects import CATALOGUE
 from tirelib.errors import ParameterError
 from tirelib.model.base import BARE, coordinates, move, predict, values_of
 from tirelib.model.chain import Changes
-from tirelib.model.solution import (
-    Solution,
-    SolutionSlopes,
-    added_by_values,
-    by_effects,
-    by_values,
-    made_with,
-    slopes_of,
-    solved,
-)
+from tirelib.model.slopes import SolutionSlopes, added_by_values, by_effects, by_values, slopes_of
+from tirelib.model.solution import Solution, made_with, solved
 from tirelib.model.state import READ, State
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID
@@ -153,11 +145,9 @@ def test_slopes_are_differences(effects: dict[str, float]) -> None:
         difference = (with_them(there, effects) - with_them(back, effects)) / (2.0 * step)
         assert np.linalg.norm(slopes[k] - difference) < 0.01 * np.linalg.norm(difference), FREE[k]
     there_effects, steps = [], []
-    for name in effects:
+    for place, (name, strength) in enumerate(effects.items()):
         effect = CATALOGUE[name]
-        moved = {**effects, name: effects[name] + 1e-3 * effect.toward}
-        changes = [CATALOGUE[n].at(s) for n, s in moved.items()]
-        there_effects.append((effect.hook, changes))
+        there_effects.append((place, effect.at(strength + 1e-3 * effect.toward)))
         steps.append(1e-3 * effect.toward)
     rows = by_effects(found, there_effects, steps).waveform
     for row, name, h in zip(rows, effects, steps, strict=True):
