@@ -142,7 +142,7 @@ def judged(
     looseness = np.inf
     for law in (*laws, *loose):
         best = int(np.argmax(levels[min(law, LAWS[-1])]))
-        tested = _tested(problem, fit, views, families, law, best)
+        tested = _tested(fit, views, families, law, best)
         nulls, plain = tested
         stays = _p(np.array([_excusing(nulls).scores.max()]), plain)[0] > alpha
         if law == laws[0] or (stays and law != LOOSEST):
@@ -168,7 +168,6 @@ def _likelihoods(
 
 
 def _tested(
-    problem: Problem,
     fit: Posterior,
     views: Sequence[View],
     families: Sequence[Family],
@@ -183,9 +182,10 @@ def _tested(
     nulls = tuple(_null(at, fit, family, law) for family in families)
     plain = []
     for family in families:
-        tires = plain_tires(problem, fit, family, law_errors(fit, law), OWN[best])
+        planted, noise = _drawn(fit, family, law_errors(fit, law), at.white.shape[1])
+        tires = noise + planted @ at.white  # whitened
         others = [null for null in nulls if null.family is not family]
-        plain.append(_statistic(others, products(problem, at, tires)))
+        plain.append(_statistic(others, _products(at, tires)))
     return nulls, tuple(plain)
 
 
@@ -223,6 +223,17 @@ def plain_tires(
     shape (n_tires, ...)
     """
     whiten, rows = problem.whitener(own), np.concatenate(list(fit.rows.values()))
+    planted, noise = _drawn(fit, family, laws, whiten(fit.rest).size)
+    return np.asarray(whiten.coloured(noise) + np.tensordot(planted, rows, axes=1))
+
+
+def _drawn(
+    fit: Posterior, family: Family, laws: Mapping[str, float | FloatArray], count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return coefficients of all rows for plain tires, (n_tires, m), and white noise (n_tires, n).
+
+    The errors of the hypothesis' laws are drawn with the given variances.
+    """
     blocks, first = {}, 0
     for name, each in fit.rows.items():
         blocks[name] = slice(first, first + len(each))
@@ -233,14 +244,15 @@ def plain_tires(
         block = blocks[name]
         size = (len(family), block.stop - block.start)
         planted[:, block] = np.sqrt(variance) * random.standard_normal(size)
-    count = whiten(fit.rest).size
-    tires = whiten.coloured(random.standard_normal((len(family), count)))
-    return np.asarray(tires + np.tensordot(planted, rows, axes=1))
+    return planted, random.standard_normal((len(family), count))
 
 
 def products(problem: Problem, view: View, tires: FloatArray) -> Products:
     """Return the products of residuals (k, ...) with the rows of a view."""
-    white = problem.whitener(view.own)(tires)
+    return _products(view, problem.whitener(view.own)(tires))
+
+
+def _products(view: View, white: FloatArray) -> Products:
     return view.white @ white.T, np.sum(white**2, axis=1)
 
 
