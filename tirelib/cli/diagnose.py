@@ -79,7 +79,7 @@ def diagnose(
     campaign = read_campaign(folder)
     with progress_bar("diagnosing") as progress:
         told, document = diagnosed(campaign, file, catalogue, quantity, false_alarm, progress)
-    write_told(told, document, model_name, folder, file, out, json_file)
+    write_told(told, document, model_name, folder, file, out, json_file, effect_files)
 
 
 def write_told(
@@ -90,11 +90,12 @@ def write_told(
     file: "TireFile",
     out: Path | None,
     json_file: Path | None,
+    effect_files: Sequence[Path] = (),
 ) -> None:
     """Say a diagnosis of a model in four lines and more, and write its page and its numbers."""
     from tirelib.report.explanation import explained
 
-    explanation = explained(document, model_name, str(folder))
+    explanation = explained(document, model_name, str(folder), effect_files)
     document["explanation"] = asdict(explanation)
     _say(document, explanation.lines)
     console = output()

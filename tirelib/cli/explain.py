@@ -123,7 +123,7 @@ class Steps:
     def __init__(self, folder: Path, out: Path, effect_files: tuple[Path, ...]) -> None:
         from tirelib.model.registration import registered_effects
 
-        self.folder, self.out = folder, out
+        self.folder, self.out, self.effect_files = folder, out, effect_files
         self.campaign, self.catalogue = read_campaign(folder), registered_effects(effect_files)
         self.effects = [word for path in effect_files for word in ("--effects", str(path))]
         self.commands: list[str] = []
@@ -184,7 +184,9 @@ class Steps:
                     self.campaign, file, self.catalogue, quantity, FALSE_ALARM, progress
                 )
             target = self.out / "diagnosis.json"
-            cli_diagnose.write_told(told, document, model, self.folder, file, page, target)
+            cli_diagnose.write_told(
+                told, document, model, self.folder, file, page, target, self.effect_files
+            )
         return told, dict(plain(document))
 
     def _identified(self) -> str:

@@ -53,7 +53,12 @@ def titled(lines: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
     return tuple((TITLES[key], said) for key, said in lines.items())
 
 
-def explained(told: Mapping[str, Any], model: str = "M.toml", folder: str = "DIR") -> Explanation:
+def explained(
+    told: Mapping[str, Any],
+    model: str = "M.toml",
+    folder: str = "DIR",
+    effect_files: Sequence[str | Path] = (),
+) -> Explanation:
     """Return a diagnosis in four lines.
 
     Parameters
@@ -62,8 +67,11 @@ def explained(told: Mapping[str, Any], model: str = "M.toml", folder: str = "DIR
         ``tirelib-diagnosis/1``.
     model, folder : str
         The model file and the campaign's folder, as commands name them.
+    effect_files : sequence of str or Path
+        Files with effects of the user's own.
     """
-    return Explanation(_missing(told), _sure(told), error_line(told), _next(told, model, folder))
+    data = " ".join([folder, *(f"--effects {file}" for file in effect_files)])
+    return Explanation(_missing(told), _sure(told), error_line(told), _next(told, model, data))
 
 
 def _missing(told: Mapping[str, Any]) -> str:
@@ -314,12 +322,12 @@ def _floor(told: Mapping[str, Any], after: float) -> str:
     return f" Of that, noise and the structure of a tire explain {_said(floor)}."
 
 
-def _next(told: Mapping[str, Any], model: str, folder: str) -> str:
+def _next(told: Mapping[str, Any], model: str, data: str) -> str:
     if told["verdict"] in ("named", "form_inadequate"):
         option = "" if told["quantity"] == "strain" else f" --quantity {told['quantity']}"
         return (
             f"Add {'it' if len(told['named']) == 1 else 'them together'}: "
-            f"tirelib add {' '.join(told['named'])} --model {model} --data {folder}{option} "
+            f"tirelib add {' '.join(told['named'])} --model {model} --data {data}{option} "
             "--out M2.toml; then diagnose again with the new model."
         )
     what = str(told["next_test"]["what"]).rstrip(".")

@@ -90,6 +90,11 @@ def test_two_effects_that_are_named_together_are_added_together() -> None:
     assert told.next.startswith("Add them together: tirelib add damping shear --model M.toml ")
 
 
+def test_an_effect_of_a_users_file_is_added_with_that_file() -> None:
+    told = explained(diagnosis(), "M.toml", "DIR", ["mine.py"])
+    assert "--data DIR --effects mine.py --out M2.toml" in told.next
+
+
 def test_a_plain_difference_that_rises_while_the_error_falls_is_told_with_its_reason() -> None:
     told = error_line(diagnosis(residual_rms_before=28.2, residual_rms_after=46.9))
     assert "It was 30 times the noise, 23.5 with" in told
