@@ -12,8 +12,8 @@ that is what is missing; several, they cannot be told apart; none at all, someth
 there.
 """
 
+import os
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -123,6 +123,7 @@ class Hypotheses:
             )
         self.families = tuple(families)
         self.false_alarm, self.progress = false_alarm, progress
+        self._process = os.getpid()
         self.spread = pooled(families, sizes_at_start(problem))
         self.own = max(family.own for family in families)
         self.had = problem.start.effects
@@ -199,7 +200,10 @@ class Hypotheses:
     def _begun(self, problem: Problem) -> tuple[Problem, Hypothesis]:
         """Return the problem about the likeliest fit without further effects, and this fit."""
         shared = [*self.had, *self.effects.values(), *self.families]
-        found = forked([partial(self._from, problem, start) for start in problem.starts], shared)
+        part = problem.thinned()
+        calls = [partial(self._roughly, part, k) for k in range(len(problem.starts))]
+        starts = _apart(part, problem.starts, forked(calls, shared))
+        found = forked([partial(self._from, problem, start) for start in starts], shared)
         settled = [each for each in found if not isinstance(each, TirelibError)]
         if not settled:
             raise next(each for each in found if isinstance(each, TirelibError))
@@ -208,34 +212,54 @@ class Hypotheses:
             problem = problem.about(solved)
         return problem, base
 
+    def _roughly(self, part: Problem, k: int) -> Posterior | None:
+        """Return a rough fit of a part of the measurement from one start; None if none settles."""
+        try:
+            return self._fit(part, start=part.starts[k], settled=ROUGH)
+        except TirelibError:
+            return None
+
     def _from(self, problem: Problem, start: Point) -> tuple[list[Any], Hypothesis] | TirelibError:
         """Return the fit from a start, and the solutions that its whitening was about in turn."""
         passed: list[Any] = []
-        # the copy of this process that has another start says nothing
-        progress = self.progress if start is problem.start else None
-        fits = partial(
-            posterior, effects=self.had, spread=self.spread, own=self.own, progress=progress
-        )
-        part = problem.thinned()
-        if part is not problem:
-            with suppress(TirelibError):  # the whole problem says what is wrong
-                start = fits(part, start=start, settled=ROUGH).point
         try:
-            fit = fits(problem, start=start, settled=ROUGH)
+            fit = self._fit(problem, start=start, settled=ROUGH)
             for _ in range(ROUNDS):
                 # a whitening is right nearby only
                 nearer = problem.about(fit.solved)
                 if nearer is problem or fit.far:
                     break  # a model that is far off has no whitening that is right
                 passed.append(fit.solved)
-                problem, fit = nearer, fits(nearer, near=fit, settled=ROUGH)
-            return passed, self._tested(problem, fits(problem, near=fit))
+                problem, fit = nearer, self._fit(nearer, near=fit, settled=ROUGH)
+            return passed, self._tested(problem, self._fit(problem, near=fit))
         except TirelibError as error:
             return error
+
+    def _fit(self, problem: Problem, **how: Any) -> Posterior:
+        """Return the fit without further effects; a copy of the first process says nothing."""
+        progress = self.progress if os.getpid() == self._process else None
+        return posterior(problem, self.had, self.spread, self.own, progress=progress, **how)
 
     def _tested(self, problem: Problem, fit: Posterior) -> Hypothesis:
         had = len(self.had)
         return judged(problem, fit, self.families, self.false_alarm, own_effects=had)
+
+
+def _apart(
+    part: Problem, starts: Sequence[Point], rough: Sequence[Posterior | None]
+) -> list[Point]:
+    """Return where fits go on: at the end of each rough one, once for those that are one model.
+
+    Two models are one where the whitening about the better one need not follow the other.
+    """
+    out: list[Point] = []
+    kept: list[Problem] = []
+    for fit in sorted(filter(None, rough), key=lambda fit: fit.cost):
+        if all(there.about(fit.solved) is not there for there in kept):
+            kept.append(part.about(fit.solved))
+            out.append(fit.point)
+    # the whole measurement says what is wrong with a start that a part of it does not settle from
+    return out + [start for start, fit in zip(starts, rough, strict=True) if fit is None]
 
 
 @one_thread()

@@ -12,7 +12,7 @@ from tirelib.errors import ParameterError
 from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Point
-from tirelib.infer.select import Hypotheses, select
+from tirelib.infer.select import Hypotheses, _apart, select
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 
@@ -223,3 +223,26 @@ def test_a_fit_begins_where_that_of_a_part_ended(solved: bool) -> None:
     # z^3 - 3 z is -2 for the part, at z = -2
     first = next(z for z in whole.began[1:] if z != whole.began[0]) if solved else whole.began[1]
     assert first == pytest.approx(-2.0 if solved else -1.5, abs=0.1)
+
+
+class Followed(Valleys):
+    """A problem whose whitening follows the model."""
+
+    def about(self, solved: Any) -> Toy:
+        there = getattr(self, "there", self.measured)
+        if np.abs(solved.rest - there).max() < 0.1:
+            return self
+        out = Followed(*(point.base[0] for point in self.starts))
+        out.there = solved.rest
+        return out
+
+
+def test_starts_that_end_in_one_model_go_on_as_one() -> None:
+    toy = Followed(2.0, -1.5, 3.0)
+    spread = FAMILIES[0].shown()
+    fits = [posterior(toy, (), spread, 0.001, start=start) for start in toy.starts]
+    best, stuck = _apart(toy, toy.starts, fits)
+    assert best.base[0] == pytest.approx(2.71, abs=0.1)
+    assert stuck.base[0] == pytest.approx(-1.0, abs=0.1)
+    # a start from which the part does not settle is tried on the whole
+    assert _apart(toy, toy.starts, [fits[0], None, fits[2]])[1] is toy.starts[1]
