@@ -51,7 +51,7 @@ export class Open {
     this.picker = h("input", { type: "file", multiple: true, hidden: true, onchange: (event) => receive([...event.target.files].map((f) => [f.name, f]), this.go) });
     this.zone = h("div", { class: "drop", tabindex: "0", role: "button", onclick: () => this.picker.click(), onkeydown: (event) => { if (event.key === "Enter" || event.key === " ") this.picker.click(); } },
       "Drop a campaign folder, its zip archive, measured files (MAT, CSV, Parquet, TYDEX, MDF) or an effect file (.py) anywhere on this page, or click here to choose files");
-    this.element = h("div", { class: "two" }, h("div", {}, this.start, this.recent), this.facts);
+    this.element = h("div", { class: "two" }, h("div", {}, this.start), h("div", {}, this.facts));
     fill(this.start, h("h2", {}, "Measurements"), h("p", {}, "A campaign is a folder with campaign.toml, runs.csv and the recorded runs. Other files are imported."),
       h("div", { class: "row" },
         h("button", { class: "main", type: "button", id: "example", onclick: () => this.example() }, "Try the example"),
@@ -93,7 +93,10 @@ export class Open {
     const home = app.home;
     if (!home) return;
     this.progress();
-    const broken = home.jobs.filter((job) => ["interrupted", "failed", "cancelled"].includes(job.state) && ["rig", "import"].includes(job.kind)).slice(-3);
+    // what failed before the same kind of job went well is no news
+    const last = (kind) => Math.max(0, ...home.jobs.filter((job) => job.kind === kind && job.state === "done").map((job) => job.job));
+    const broken = home.jobs.filter((job) => ["rig", "import"].includes(job.kind) && ["interrupted", "failed", "cancelled"].includes(job.state) && job.job > last(job.kind)).slice(-3);
+    this.element.children[app.wanted ? 0 : 1].append(this.recent); // the right half belongs to the campaign that is open
     fill(this.recent, h("h2", {}, "Recent campaigns"),
       home.campaigns.length ? h("ul", { class: "list" }, home.campaigns.map((one) => h("li", {},
         h("button", { class: "link", type: "button", onclick: () => this.go("open", one.campaign) }, one.title), h("span", { class: "quiet small" }, one.there ? one.folder : `${one.folder} is not there`),

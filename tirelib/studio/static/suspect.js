@@ -18,11 +18,24 @@ export class Suspect {
     this.field = new Field({ height: 260, onRow: () => this.draw() });
     this.plot = new Plot("trace", { height: 230 });
     this.about = h("div", { class: "card" }, this.plot.element);
-    this.body = h("div", { class: "two wide-left" }, this.list, h("div", {}, this.about, this.field.element));
+    this.side = h("div", {}, this.about, this.field.element);
+    this.body = h("div", { class: "two wide-left" }, this.list, this.side);
     this.element = h("div", {}, this.head, this.body);
+    this.resized = () => this.arrange();
+    window.addEventListener("resize", this.resized);
   }
 
-  leave() { this.plot.remove(); this.field.curve.remove(); this.field.rest.remove(); }
+  // The plot and the map end where the list of effects beside them ends.
+  arrange() {
+    const { plot, list, side, field: { heat } } = this;
+    if (this.body.hidden || !this.body.clientWidth) return;
+    const drawn = plot.place.clientHeight + heat.canvas.clientHeight;
+    const free = side.offsetLeft > list.offsetLeft ? list.offsetHeight - (side.clientHeight - drawn) : 0;
+    plot.fixed = Math.max(230, 0.47 * free); heat.fixed = Math.max(260, 0.53 * free);
+    heat.draw(); plot.fit();
+  }
+
+  leave() { window.removeEventListener("resize", this.resized); this.plot.remove(); this.field.curve.remove(); this.field.rest.remove(); }
   progress() { if (this.body.hidden) wait(this.head, KINDS); }
 
   async update() {
@@ -45,6 +58,7 @@ export class Suspect {
     this.say();
     this.table();
     this.draw();
+    this.arrange();
   }
 
   // The effects of the catalogue without a verdict: what is ticked is fitted all the same.
@@ -57,6 +71,7 @@ export class Suspect {
     this.table();
     this.list.dataset.key = key;
     this.draw();
+    this.arrange();
   }
 
   say() {
