@@ -93,3 +93,6 @@ class ConvergenceError(TirelibError, RuntimeError):
         self.iterate = iterate
         self.residual = residual
         super().__init__(message)
+
+    def __reduce__(self) -> tuple[type["ConvergenceError"], tuple[str, object, float]]:
+        return type(self), (str(self), self.iterate, self.residual)

@@ -398,9 +398,6 @@ def test_what_is_dropped_is_checked_or_imported(browser: Any, tmp_path: Path) ->
         page.get_by_label("unit of Druck vorn [bar]").fill("bar")
         page.locator("#import").click()
         wait_for(page, "!!studio.campaign && studio.campaign.title === 'messung'")
-        page.evaluate("location.hash = '#/open/'")
-        page.get_by_role("button", name="messung").wait_for()
-        assert page.get_by_text("Run again").count() == 0  # the import that failed is no news
         page.context.close()
     made = read_campaign(next(tmp_path.glob("s/jobs/*/out/campaign")))
     runs = list(made.runs())

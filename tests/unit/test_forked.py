@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tirelib.errors import ParameterError
+from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.forked import forked
 
 COUNT = 5
@@ -52,3 +52,12 @@ def test_what_a_call_raises_is_raised_here(processors: int) -> None:
         forked([lambda: 1, refuse])
     with pytest.raises(ParameterError, match="no such thing"):
         forked([refuse, lambda: 1])
+
+
+def test_an_iteration_that_fails_in_the_copy_fails_here_with_its_iterate(processors: int) -> None:
+    def fails() -> None:
+        raise ConvergenceError("no contact", [1.0, 2.0], 0.5)
+
+    with pytest.raises(ConvergenceError, match="no contact") as found:
+        forked([lambda: None, fails])
+    assert (found.value.iterate, found.value.residual) == ([1.0, 2.0], 0.5)

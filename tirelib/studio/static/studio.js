@@ -75,6 +75,7 @@ document.getElementById("theme").addEventListener("click", () => {
   const name = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
   localStorage.setItem("theme", name);
   theme(name);
+  window.dispatchEvent(new Event("resize")); // maps are drawn again in the colours of the theme
 });
 
 // Files may be dropped anywhere: the browser would leave the page otherwise.
