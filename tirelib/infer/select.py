@@ -200,9 +200,10 @@ class Hypotheses:
     def _begun(self, problem: Problem) -> tuple[Problem, Hypothesis]:
         """Return the problem about the likeliest fit without further effects, and this fit."""
         shared = [*self.had, *self.effects.values(), *self.families]
-        part = problem.thinned()
-        calls = [partial(self._roughly, part, k) for k in range(len(problem.starts))]
-        starts = _apart(part, problem.starts, forked(calls, shared))
+        part, starts = problem.thinned(), list(problem.starts)
+        if part is not problem or len(starts) > 1:
+            calls = [partial(self._roughly, part, k) for k in range(len(starts))]
+            starts = _apart(part, starts, forked(calls, shared))
         found = forked([partial(self._from, problem, start) for start in starts], shared)
         settled = [each for each in found if not isinstance(each, TirelibError)]
         if not settled:
