@@ -16,6 +16,7 @@ pytest.importorskip("distributed", reason="the extra tirelib[fleet] is not insta
 
 import dask.config
 from distributed import Client, LocalCluster
+from distributed.core import Status
 
 from tests.synthetic import synthetic_run, write
 from tirelib.cli.fleet import run_verb
@@ -151,11 +152,31 @@ def test_a_worker_that_starts_slowly_again_is_not_given_up() -> None:
     assert second != first
 
 
-def test_an_interrupt_of_the_terminal_ends_no_worker() -> None:
+def test_an_interrupt_of_the_terminal_ends_no_worker_and_no_other_in_its_place() -> None:
     with cluster.cluster(None, 1) as client:
         (first,) = client.run(os.getpid).values()
         os.kill(first, signal.SIGINT)
         assert client.submit(os.getpid, pure=False).result(timeout=PATIENCE) == first
+        os.kill(first, signal.SIGKILL)
+        second = client.submit(os.getpid, pure=False).result(timeout=PATIENCE)
+        os.kill(second, signal.SIGINT)
+        assert client.submit(os.getpid, pure=False).result(timeout=PATIENCE) == second
+
+
+def test_an_interrupt_while_the_cluster_starts_ends_it_when_it_is_whole(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    started: list[LocalCluster] = []
+
+    def start(**given: object) -> LocalCluster:
+        os.kill(os.getpid(), signal.SIGINT)
+        started.append(LocalCluster(**given))
+        return started[0]
+
+    monkeypatch.setattr(cluster, "LocalCluster", start)
+    with pytest.raises(KeyboardInterrupt), cluster.cluster(None, 1):
+        pytest.fail("the interrupt was lost")
+    assert started[0].status is Status.closed
 
 
 def test_a_worker_keeps_no_call_stacks_of_what_it_did() -> None:

@@ -145,23 +145,21 @@ def fleet(
         reports=reports,
     )
     console = output()
+    counts = engine.Counts(total=len(sources))
     stopped = ""
-    with cluster(scheduler, workers) as client:
-        click.echo(f"Dask dashboard: {client.dashboard_link}", err=True)
-        if not client.nthreads():
-            click.echo("Warning: no worker has joined; the work begins with the first", err=True)
-        with _progress(task) as show:
-            counts = engine.Counts()
-            try:
+    try:
+        with cluster(scheduler, workers) as client:
+            click.echo(f"Dask dashboard: {client.dashboard_link}", err=True)
+            if not client.nthreads():
+                click.echo("Warning: no worker has joined; the work begins with the first", err=True)
+            with _progress(task) as show:
                 engine.run(
                     sources, data, recipe, client, run_verb, counts=counts, delta=delta, report=show
                 )
-            except KeyboardInterrupt:
-                stopped = (
-                    "interrupted; what is finished is kept; the same command goes on from here"
-                )
-            except engine.SchedulerLostError as lost:
-                stopped = str(lost)
+    except KeyboardInterrupt:
+        stopped = "interrupted; what is finished is kept; the same command goes on from here"
+    except engine.SchedulerLostError as lost:
+        stopped = str(lost)
     _print(console, task, counts, engine.causes(counts))
     try:
         console.print(f"written: {write_fleet_page(data)}")

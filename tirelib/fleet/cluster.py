@@ -3,10 +3,11 @@
 import logging
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from multiprocessing import resource_tracker
 
 import dask.config
-from distributed import Client, LocalCluster, WorkerPlugin
+from distributed import Client, LocalCluster
 
 from tirelib import __version__
 from tirelib.errors import FormatError
@@ -19,13 +20,32 @@ the short tasks of a fleet, and takes part of the processor (``build/fleet_proof
 PATIENT = {"distributed.deploy.lost-worker-timeout": "1 hour"}
 """Time in which a killed worker of this machine may come back. Dask would give it up for ever after
 15 s, and a machine with much else to do starts it later (``build/fleet_proof.py endurance``)."""
+QUIET = {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical"}
+"""Workers of this machine say nothing of their own. What goes wrong in a task is its outcome; the
+rest is a heartbeat that fails, with a traceback, when the cluster is closed while one is under way."""
 
 
-class _OnlyTheClientIsInterrupted(WorkerPlugin):
-    """A terminal sends `Ctrl-C` to workers as well, which would end with a traceback each."""
+@contextmanager
+def _interrupts_wait() -> Iterator[None]:
+    """Let `Ctrl-C` wait for the end of the block: half a cluster cannot be closed.
 
-    def setup(self, worker: object) -> None:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    A terminal sends it to every process in it. A thread hands the signals that it blocks down to the
+    threads and processes that it starts, so a loop that starts in here blocks it for good, and so
+    do the workers that the loop starts, now or when it replaces one. Python's tracker of resources
+    comes first, because its start would unblock the signal again. Other threads of this process
+    may still take it; hence the handler.
+    """
+    waiting: list[int] = []
+    resource_tracker.ensure_running()
+    handler = signal.signal(signal.SIGINT, lambda number, _: waiting.append(number))
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.signal(signal.SIGINT, handler)
+    if waiting and callable(handler):
+        handler(signal.SIGINT, None)
 
 
 @contextmanager
@@ -38,18 +58,18 @@ def cluster(address: str | None, workers: int | None) -> Iterator[Client]:
         If there is no scheduler at the address, or its workers have another version of tirelib.
     """
     if address is None:
-        with (
-            dask.config.set(NO_PROFILER | PATIENT),
-            LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                dashboard_address=":0",
-                silence_logs=logging.ERROR,
-            ) as local,
-            Client(local) as client,
-        ):
-            client.register_plugin(_OnlyTheClientIsInterrupted())
+        with dask.config.set(NO_PROFILER | PATIENT | QUIET), ExitStack() as stack:
+            with _interrupts_wait():
+                local = LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address=":0",
+                    silence_logs=logging.ERROR,
+                )
+                stack.callback(_closed, local)
+                client = Client(local)
+                stack.callback(_closed, client)
             yield client
         return
     try:
@@ -68,6 +88,11 @@ def cluster(address: str | None, workers: int | None) -> Iterator[Client]:
                 f"{next(iter(odd.values()))}, this is {__version__}; all need the same version"
             )
         yield client
+
+
+def _closed(part: LocalCluster | Client) -> None:
+    with _interrupts_wait():
+        part.close()
 
 
 def _version() -> str:

@@ -188,7 +188,7 @@ def run(
         If the scheduler goes away.
     """
     counts = Counts() if counts is None else counts
-    counts.total = len(sources)
+    counts.total, counts.began = len(sources), time.monotonic()
     delta = delta or data.has("container_metrics", "_delta_log")
     data.repair(recipe.task)
     finished, marks = data.finished(recipe.task, recipe.hash)
