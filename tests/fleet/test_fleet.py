@@ -1,6 +1,7 @@
 """A fleet on a cluster: what is kept, skipped, reported, resumed, and who can read it."""
 
 import json
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from tirelib.fleet import engine, work
 from tirelib.fleet.dataset import DataSet
 from tirelib.fleet.engine import Counts
 from tirelib.fleet.page import fleet_document, write_fleet_page
-from tirelib.fleet.sources import content_hash, find_sources
+from tirelib.fleet.sources import Source, content_hash, find_sources
 
 
 def run(
@@ -126,6 +127,53 @@ def test_finished_ones_are_skipped_wherever_they_lie(
         moved.rename(campaigns / "north" / "day-2")
     assert (counts.total, counts.known, counts.done) == (1, 1, 0)
     assert len(pd.read_parquet(out / "container_metrics")) == 4
+
+
+def test_a_copy_is_computed_once_and_named_beside_the_other(
+    campaigns: Path, client: Client, tmp_path: Path
+) -> None:
+    for place in ("a", "b", "c"):
+        shutil.copytree(campaigns / "north" / f"day-{int(place == 'c')}", tmp_path / "in" / place)
+    first, again = (run("check", [tmp_path / "in"], tmp_path / "out", client) for _ in range(2))
+    assert (first.done, first.known, first.copies, first.left) == (2, 1, 1, 0)
+    assert (again.skipped, again.copies) == (3, 0)
+    document = fleet_document(DataSet(str(tmp_path / "out")))
+    places = {row["file_path"]: row["copies"] for row in document["containers"]}
+    (one,) = (path for path, copies in places.items() if copies)
+    assert {one, *places[one]} == {str(tmp_path / "in" / place) for place in ("a", "b")}
+    assert len(places) == 2
+    assert places[one][0] in Path(write_fleet_page(DataSet(str(tmp_path / "out")))).read_text()
+
+
+def test_a_worker_that_has_not_the_folders_says_so(campaigns: Path, tmp_path: Path) -> None:
+    data = DataSet(str(tmp_path / "out"))
+    data.open()
+    recipe = engine.recipe_of("check", data, files={})
+    here = find_sources([str(campaigns / "north")])[0]
+    gone = Source(str(tmp_path / "gone"), True)
+    for source, place in ((gone, data.url), (here, str(tmp_path / "elsewhere"))):
+        said = work.process(source, "mark", recipe, place, run_verb).failed
+        assert "no such folder on the worker" in said
+    assert not (tmp_path / "elsewhere").exists()
+
+
+def test_a_data_set_has_the_same_address_for_workers_of_another_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert DataSet("out").url == str(tmp_path / "out")
+
+
+def test_a_header_that_is_broken_is_the_cause_and_not_the_tire_that_it_hides(
+    campaigns: Path, client: Client, tmp_path: Path
+) -> None:
+    calibrations = DataSet(str(tmp_path / "calibrations"))
+    calibrations.open()
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "campaign.toml").write_text("[tire\n")
+    counts = run("estimate", [tmp_path], tmp_path / "out", client, calibration=calibrations.url)
+    (said,) = counts.messages.values()
+    assert "campaign.toml: not TOML" in said
 
 
 def test_a_client_that_dies_loses_nothing(

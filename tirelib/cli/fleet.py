@@ -147,11 +147,15 @@ def fleet(
     console = output()
     counts = engine.Counts(total=len(sources))
     stopped = ""
+    if scheduler is not None:
+        click.echo(f"Connecting to {scheduler}", err=True)
     try:
         with cluster(scheduler, workers) as client:
             click.echo(f"Dask dashboard: {client.dashboard_link}", err=True)
             if not client.nthreads():
-                click.echo("Warning: no worker has joined; the work begins with the first", err=True)
+                click.echo(
+                    "Warning: no worker has joined; the work begins with the first", err=True
+                )
             with _progress(task) as show:
                 engine.run(
                     sources, data, recipe, client, run_verb, counts=counts, delta=delta, report=show
@@ -255,6 +259,11 @@ def _print(console: Console, task: str, counts: "Counts", causes: list[tuple[str
         f"{counts.skipped + counts.known} finished before, {counts.failed} failed, "
         f"{counts.left} left"
     )
+    if counts.copies:
+        console.print(
+            f"  {counts.copies} finished before have the content of another one; the list of the "
+            "page says of which"
+        )
     if counts.negative:
         console.print(f"  the answer is negative for {counts.negative} of them; see the page")
     for message, number in causes[:SHOWN]:

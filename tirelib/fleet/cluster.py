@@ -13,7 +13,9 @@ from tirelib import __version__
 from tirelib.errors import FormatError
 
 CONNECT = 20.0
-"""Time in which a scheduler must answer, [s]."""
+"""Time in which a scheduler must answer, [s]: one that is started at the same moment answers after
+0.5 s as a program of this machine (five starts, 0.44 to 0.48 s) and after 2 s in a container. Half
+of it is still five times that; with double, a wrong address costs 40 s before it is said."""
 NO_PROFILER = {"distributed.worker.profile.enabled": False}
 """Dask's profiler keeps call stacks of the last 1,000 seconds in each worker, 0.4 MB a second with
 the short tasks of a fleet, and takes part of the processor (``build/fleet_proof.py memory``)."""
@@ -21,15 +23,15 @@ PATIENT = {"distributed.deploy.lost-worker-timeout": "1 hour"}
 """Time in which a killed worker of this machine may come back. Dask would give it up for ever after
 15 s, and a machine with much else to do starts it later (``build/fleet_proof.py endurance``)."""
 QUIET = {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical"}
-"""Workers of this machine say nothing of their own. What goes wrong in a task is its outcome; the
-rest is a heartbeat that fails, with a traceback, when the cluster is closed while one is under way."""
+"""Workers of this machine print nothing of their own. What goes wrong in a task is its outcome; the
+rest is a heartbeat that fails, with a traceback, when the cluster closes while one is under way."""
 
 
 @contextmanager
 def _interrupts_wait() -> Iterator[None]:
     """Let `Ctrl-C` wait for the end of the block: half a cluster cannot be closed.
 
-    A terminal sends it to every process in it. A thread hands the signals that it blocks down to the
+    A terminal sends it to every process in it. A thread hands the signals that it blocks on to the
     threads and processes that it starts, so a loop that starts in here blocks it for good, and so
     do the workers that the loop starts, now or when it replaces one. Python's tracker of resources
     comes first, because its start would unblock the signal again. Other threads of this process
@@ -76,8 +78,8 @@ def cluster(address: str | None, workers: int | None) -> Iterator[Client]:
         client = Client(address, timeout=CONNECT)
     except (OSError, ValueError) as error:
         raise FormatError(
-            f"--scheduler {address}: no scheduler answers ({error}); start one with `dask "
-            "scheduler`, or leave the option out for a cluster on this machine"
+            f"--scheduler {address}: no scheduler answers ({error}); give the address that `dask "
+            "scheduler` prints, tcp://HOST:PORT, or leave the option out for one on this machine"
         ) from None
     with client:
         versions = client.run(_version)

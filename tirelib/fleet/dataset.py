@@ -11,6 +11,7 @@ import json
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,28 @@ from tirelib.fleet.tables import PARTITION, SCHEMAS, SMALL
 
 FORMAT = "tirelib-fleet/1"
 HEAD = "fleet.json"
+ALSO_AT, ALSO_AS = "also_at", "also_as"
+"""Tags of a container: address and fingerprint of a copy, whose content is the container's."""
 Rows = Mapping[str, Sequence[Mapping[str, Any]]]
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """The finished containers of a task.
+
+    Attributes
+    ----------
+    answers : dict of int to int
+        The verb's exit code, by identifier.
+    marks : dict of str to int
+        The same by fingerprint, that of a copy too.
+    places : set of (int, str)
+        Identifier and address, those of copies too.
+    """
+
+    answers: dict[int, int] = field(default_factory=dict)
+    marks: dict[str, int] = field(default_factory=dict)
+    places: set[tuple[int, str]] = field(default_factory=set)
 
 
 class DataSet:
@@ -44,9 +66,9 @@ class DataSet:
     """
 
     def __init__(self, url: str) -> None:
-        self.url = url
         self.fs, self.root = filesystem(url)
         self.local = self.fs.protocol in ("file", ("file", "local"))
+        self.url = self.root if self.local else url  # workers have another working directory
 
     def path(self, *parts: str) -> str:
         """Return the path of a file on the data set's file system."""
@@ -149,13 +171,23 @@ class DataSet:
             if path.endswith(".parquet") and f"/{name}/{PARTITION}=" in path and "/." not in path
         ]
 
-    def finished(self, task: str, recipe: str) -> tuple[dict[int, int], dict[str, int]]:
-        """Return the verb's exit code of what is finished, by identifier and by fingerprint."""
-        columns = ["container_id", "fingerprint", "answer"]
+    def finished(self, task: str, recipe: str) -> Finished:
+        """Return what of a task is finished, and where its content lies."""
+        found = Finished()
         chosen = (pads.field(PARTITION) == task) & (pads.field("recipe") == recipe)
-        rows = self.table("container_metrics", columns, chosen)
-        ids, marks, answers = (rows[name].to_pylist() for name in columns)
-        return dict(zip(ids, answers, strict=True)), dict(zip(marks, answers, strict=True))
+        columns = ["container_id", "fingerprint", "answer", "file_path"]
+        for row in self.table("container_metrics", columns, chosen).to_pylist():
+            found.answers[row["container_id"]] = row["answer"]
+            found.marks[row["fingerprint"]] = row["answer"]
+            found.places.add((row["container_id"], row["file_path"]))
+        columns = ["container_id", "key", "value"]
+        chosen &= pads.field("key").isin([ALSO_AT, ALSO_AS])
+        for row in self.table("container_tags", columns, chosen).to_pylist():
+            if row["key"] == ALSO_AT:
+                found.places.add((row["container_id"], row["value"]))
+            elif row["container_id"] in found.answers:
+                found.marks[row["value"]] = found.answers[row["container_id"]]
+        return found
 
     def repair(self, task: str) -> None:
         """Remove the files of batches that were not written to their end."""

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 import pyarrow.dataset as pads
 from distributed import Client, Future, as_completed
 
+from tirelib import __version__
 from tirelib.errors import FormatError, ParameterError
-from tirelib.fleet.dataset import DataSet, Rows
+from tirelib.fleet.dataset import ALSO_AS, ALSO_AT, DataSet, Finished, Rows
+from tirelib.fleet.rows import Row
 from tirelib.fleet.sources import Source, fingerprint
 from tirelib.fleet.tables import PARTITION
 from tirelib.fleet.work import NEEDS, TASKS, WRITES, Outcome, Recipe, Verb, failed, process
@@ -33,11 +35,16 @@ LATEST = 5.0
 
 @dataclass(slots=True)
 class Counts:
-    """How far a fleet has come; `negative` are those of the finished whose answer is negative."""
+    """How far a fleet has come.
+
+    Of the known, `copies` have the content of another source, here or in an earlier run; `negative`
+    are those of the finished whose answer is negative.
+    """
 
     total: int = 0
     skipped: int = 0
     known: int = 0
+    copies: int = 0
     done: int = 0
     failed: int = 0
     negative: int = 0
@@ -191,9 +198,9 @@ def run(
     counts.total, counts.began = len(sources), time.monotonic()
     delta = delta or data.has("container_metrics", "_delta_log")
     data.repair(recipe.task)
-    finished, marks = data.finished(recipe.task, recipe.hash)
-    book = _Book(data, recipe.task, finished, _delta(data) if delta else None)
-    waiting = _unfinished(sources, marks, counts)
+    finished = data.finished(recipe.task, recipe.hash)
+    book = _Book(data, recipe, finished, _delta(data) if delta else None)
+    waiting = _unfinished(sources, finished.marks, counts)
     given: dict[Future[Any], tuple[Source, str]] = {}
     done = as_completed()
     room = max(FEWEST_AHEAD, AHEAD * max(sum(client.nthreads().values()), 1))
@@ -203,7 +210,7 @@ def run(
         while given:
             for future in done.next_batch():
                 source, mark = given.pop(future)
-                _take(_outcome(future, source, mark, recipe, client), source, counts, book)
+                _take(_outcome(future, source, mark, recipe, client), source, mark, counts, book)
                 future.release()
             report(counts)
             book.close(only_if_due=True)
@@ -277,17 +284,17 @@ def _alive(client: Client) -> bool:
     return bool(client.status == "running")
 
 
-def _take(outcome: Outcome, source: Source, counts: Counts, book: "_Book") -> None:
+def _take(outcome: Outcome, source: Source, mark: str, counts: Counts, book: "_Book") -> None:
     if outcome.failed:
         counts.failed += 1
         counts.messages[source.url] = outcome.failed
         cause = outcome.rows["failures"][0]["cause"]
         counts.causes.setdefault(cause, []).append(outcome.failed)
-    elif outcome.known:
+    elif outcome.known or outcome.container in book.answers:
         counts.known += 1
     else:
         counts.done += 1
-    book.add(outcome)
+    counts.copies += book.add(outcome, source, mark)
     counts.negative += bool(book.answers.get(outcome.container))
 
 
@@ -295,9 +302,10 @@ class _Book:
     """Rows that are still to be added to the data set."""
 
     def __init__(
-        self, data: DataSet, task: str, finished: dict[int, int], log: "DeltaLog | None"
+        self, data: DataSet, recipe: Recipe, finished: Finished, log: "DeltaLog | None"
     ) -> None:
-        self._data, self._task, self.answers, self._log = data, task, finished, log
+        self._data, self._task, self._log = data, recipe.task, log
+        self._recipe, self.answers, self._places = recipe.hash, finished.answers, finished.places
         self._open()
 
     def _open(self) -> None:
@@ -307,21 +315,33 @@ class _Book:
         self._count = 0
         self._since = time.monotonic()
 
-    def add(self, outcome: Outcome) -> None:
-        """Keep the rows of an outcome, once for each container."""
+    def add(self, outcome: Outcome, source: Source, mark: str) -> bool:
+        """Keep the rows of an outcome, once for each container; return whether it is a copy."""
         if outcome.note:
             self._notes.append(outcome.note)
-        if outcome.known or (outcome.container in self.answers and not outcome.failed):
-            return
+        rows, copy = outcome.rows, False
         if not outcome.failed:
-            (row,) = outcome.rows["container_metrics"]
-            self.answers[outcome.container] = row.get("answer", 0)
-            self._channels.append(f"{PARTITION}={self._task}/{outcome.container}.parquet")
+            if outcome.known or outcome.container in self.answers:
+                if (outcome.container, source.url) in self._places:
+                    return False
+                copy = True
+                rows = {"container_tags": self._copy(outcome.container, source.url, mark)}
+            else:
+                (row,) = rows["container_metrics"]
+                self.answers[outcome.container] = row.get("answer", 0)
+                self._channels.append(f"{PARTITION}={self._task}/{outcome.container}.parquet")
+            self._places.add((outcome.container, source.url))
         if not self._count:
             self._since = time.monotonic()
         self._count += 1
-        for name, rows in outcome.rows.items():
-            self._rows.setdefault(name, []).extend(rows)
+        for name, more in rows.items():
+            self._rows.setdefault(name, []).extend(more)
+        return copy
+
+    def _copy(self, container: int, url: str, mark: str) -> list[Row]:
+        """Return the tags that say where a copy lies."""
+        same = {"container_id": container, "tirelib": __version__, "recipe": self._recipe}
+        return [{"key": ALSO_AT, "value": url, **same}, {"key": ALSO_AS, "value": mark, **same}]
 
     def close(self, *, only_if_due: bool = False) -> None:
         """Add the rows to the data set, and remove the notes of what was added."""

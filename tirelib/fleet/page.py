@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow.dataset as pads
 
 from tirelib.arrays import FloatArray
-from tirelib.fleet.dataset import DataSet
+from tirelib.fleet.dataset import ALSO_AT, DataSet
 from tirelib.fleet.siblings import join
 from tirelib.fleet.spread import FALSE_ALARM, change_of, spread_of
 from tirelib.fleet.tables import PARTITION
@@ -42,8 +42,11 @@ def fleet_document(data: DataSet) -> dict[str, Any]:
     """Return what stands out, what changes, what is joined, what is missing and what failed."""
     columns = ["container_id", "task", "name", "tire", "start_ts", "page", "answer", "file_path"]
     rows = _told_apart(data.table("container_metrics", columns).to_pylist())
-    containers = {row["container_id"]: row for row in rows}
-    sizes = _sizes(data)
+    copies = _tags(data, ALSO_AT)
+    containers = {
+        row["container_id"]: row | {"copies": copies[row["container_id"]]} for row in rows
+    }
+    sizes = {container: values[0] for container, values in _tags(data, "size").items()}
     return {
         "format": "tirelib-fleet-page/1",
         "containers": list(containers.values()),
@@ -77,12 +80,15 @@ def write_fleet_page(data: DataSet) -> str:
         for path in write_fleet(Path(folder), document, fleet_parts(document), data.url):
             data.write(path.read_bytes(), path.name)
     data.write(json.dumps(document).encode(), "index.json")
-    return data.path("index.html")
+    return f"{data.url.rstrip('/')}/index.html"
 
 
-def _sizes(data: DataSet) -> dict[int, str]:
-    rows = data.table("container_tags", ["container_id", "value"], pads.field("key") == "size")
-    return {row["container_id"]: row["value"] for row in rows.to_pylist()}
+def _tags(data: DataSet, key: str) -> dict[int, list[str]]:
+    found: dict[int, list[str]] = defaultdict(list)
+    rows = data.table("container_tags", ["container_id", "value"], pads.field("key") == key)
+    for row in rows.to_pylist():
+        found[row["container_id"]].append(row["value"])
+    return found
 
 
 def _results(data: DataSet, task: str, kind: str, columns: list[str]) -> list[dict[str, Any]]:
@@ -271,7 +277,11 @@ def _negative(data: DataSet, containers: Mapping[int, Any]) -> list[dict[str, An
 
 def _failures(data: DataSet, containers: Mapping[int, Any]) -> list[dict[str, Any]]:
     """Return what failed and has not been done since, by cause."""
-    done = {(row["task"], row["file_path"]) for row in containers.values()}
+    done = {
+        (row["task"], path)
+        for row in containers.values()
+        for path in (row["file_path"], *row["copies"])
+    }
     columns = ["task", "file_path", "cause", "message", "failed_dt"]
     latest = {}
     for row in sorted(

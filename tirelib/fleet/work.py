@@ -6,6 +6,7 @@ builds the command line, so that results are those of ``tirelib VERB DIR --json 
 
 import json
 import re
+import socket
 import tempfile
 import time
 import traceback
@@ -22,10 +23,11 @@ from tirelib import __version__
 from tirelib.campaign.header import parse_header
 from tirelib.campaign.mdf import started_at
 from tirelib.campaign.plan import parse_plans
+from tirelib.campaign.problem import Problem, errors_of
 from tirelib.campaign.recording import FILE as RECORDING
 from tirelib.campaign.recording import read_recording
 from tirelib.errors import FormatError, TirelibError
-from tirelib.fleet.dataset import DataSet, now
+from tirelib.fleet.dataset import HEAD, DataSet, now
 from tirelib.fleet.rows import Channels, Row, every, result_rows
 from tirelib.fleet.sources import Source, content_hash, fetched
 from tirelib.report.fleet_container import container_page
@@ -160,6 +162,7 @@ def failed(source: Source, mark: str, recipe: Recipe, message: str, cause: str) 
 def _processed(source: Source, mark: str, recipe: Recipe, data: DataSet, verb: Verb) -> Outcome:
     with ExitStack() as stack:
         aside = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tirelib-fleet-")))
+        _check_seen(source, data)
         folder = fetched(source, aside)
         content = content_hash(folder)
         container = container_of(recipe, content)
@@ -169,6 +172,19 @@ def _processed(source: Source, mark: str, recipe: Recipe, data: DataSet, verb: V
         if data.has(*names.document):
             return Outcome(container, "", {}, known=True)
         return _compute(_Job(source, mark, recipe, data, container, content), folder, aside, verb)
+
+
+def _check_seen(source: Source, data: DataSet) -> None:
+    """Refuse a folder that only the client's machine has."""
+    for url, seen in (
+        (source.url, not source.local or Path(source.url).is_dir()),
+        (data.url, not data.local or data.has(HEAD)),
+    ):
+        if not seen:
+            raise FormatError(
+                f"{url}: no such folder on the worker {socket.gethostname()}; a path must be the "
+                "same folder on every machine: give a shared file system or a URL"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +245,7 @@ def _compute(job: _Job, folder: Path, aside: Path, verb: Verb) -> Outcome:
     report = aside / "report"
     command = [*TASKS[recipe.task], str(folder), "--json", str(answer), *recipe.options]
     for name, path in recipe.files.items():
-        command += [f"--{name}", str(_local(data.url, path, job.content, about.tire))]
+        command += [f"--{name}", str(_local(data.url, path, job.content, about))]
     if recipe.task in TABLES:
         command += ["--out", str(turns)]
     if recipe.task in WRITES:
@@ -305,6 +321,7 @@ class _About:
     length: float
     begins: Mapping[int, float]
     tags: Mapping[str, str]
+    faults: tuple[Problem, ...] = ()
 
 
 def _about(folder: Path) -> _About:
@@ -316,7 +333,7 @@ def _about(folder: Path) -> _About:
         tags = {"name": recording.name, "tire": ";".join(tires), "axes": "iso", **wheels}
         began = min(filter(None, map(started_at, recording.files)), default=None)
         return _About("recording", recording.name, ";".join(tires), _date(began), 0.0, {}, tags)
-    header, _ = parse_header(folder)
+    header, problems = parse_header(folder)
     plans, _ = parse_plans(folder, header.axes if header else "iso")
     begins = {plan.run: plan.start for plan in plans if plan.start is not None}
     began = min(filter(None, (started_at(folder / plan.file) for plan in plans)), default=None)
@@ -325,7 +342,8 @@ def _about(folder: Path) -> _About:
     tags = {"name": name, "tire": tire, "axes": "iso", "runs": str(len(plans))}
     if header is not None:
         tags |= {"rig": header.rig_name, "size": size_of(header.tire.free_radius)}
-    return _About("campaign", name, tire, _date(began), 0.0, begins, tags)
+    faults = () if header is not None else tuple(errors_of(problems))
+    return _About("campaign", name, tire, _date(began), 0.0, begins, tags, faults)
 
 
 def size_of(free_radius: float) -> str:
@@ -349,15 +367,17 @@ def _kept(address: str, path: str) -> Path:
     return target
 
 
-def _local(address: str, path: str, content: str, tire: str) -> Path:
+def _local(address: str, path: str, content: str, about: _About) -> Path:
     """Return the calibration or model of a container: one for all, or by content, or by tire."""
     if not path.endswith("index.json"):
         return _kept(address, path)
     index = json.loads(_kept(address, path).read_text())
-    found = index["by_content"].get(content) or index["by_tire"].get(tire)
+    found = index["by_content"].get(content) or index["by_tire"].get(about.tire)
     if found is None:
+        if about.faults:
+            raise FormatError(about.faults)
         raise FormatError(
-            f"tire {tire!r}: {index['data_set']} holds nothing of this campaign or tire; run the "
-            "task that makes it over the same paths first"
+            f"tire {about.tire!r}: {index['data_set']} holds nothing of this campaign or tire; run "
+            "the task that makes it over the same paths first"
         )
     return _kept(index["data_set"], found)

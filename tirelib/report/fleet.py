@@ -4,7 +4,7 @@ Every point and every row opens the page of its campaign or recording.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -99,6 +99,13 @@ def fleet_parts(document: Mapping[str, Any]) -> list[Part]:
 
 def _link(page: str, text: str) -> Markup:
     return Markup('<a href="{}">{}</a>').format(page, text) if page else Markup.escape(text)
+
+
+_WHICH: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
+    "campaign": lambda row: _link(row["page"], row["name"]),
+    "tire": lambda row: row["tire"],
+    "task": lambda row: row["task"],
+}
 
 
 def _parameters(parameters: Sequence[Mapping[str, Any]]) -> Part:
@@ -343,9 +350,7 @@ def _negative(negative: Sequence[Mapping[str, Any]]) -> Part:
         "Negative answers",
         negative[:MOST_ROWS],
         {
-            "campaign": lambda each: _link(each["page"], each["name"]),
-            "tire": lambda each: each["tire"],
-            "task": lambda each: each["task"],
+            **_WHICH,
             "first reason": lambda each: each["first"].partition(";")[0][:160],
             "reasons": lambda each: str(each["reasons"]),
         },
@@ -365,10 +370,8 @@ def _containers(containers: Sequence[Mapping[str, Any]]) -> Part:
         "Pages of all",
         containers[:MOST_ROWS],
         {
-            "campaign": lambda row: _link(row["page"], row["name"]),
-            "tire": lambda row: row["tire"],
-            "task": lambda row: row["task"],
-            "path": lambda row: row["file_path"],
+            **_WHICH,
+            "path": lambda row: "; copy: ".join((row["file_path"], *row["copies"])),
         },
         texts=4,
         note=note,
