@@ -150,10 +150,13 @@ def test_a_worker_that_has_not_the_folders_says_so(campaigns: Path, tmp_path: Pa
     data.open()
     recipe = engine.recipe_of("check", data, files={})
     here = find_sources([str(campaigns / "north")])[0]
-    gone = Source(str(tmp_path / "gone"), True)
-    for source, place in ((gone, data.url), (here, str(tmp_path / "elsewhere"))):
-        said = work.process(source, "mark", recipe, place, run_verb).failed
-        assert "no such folder on the worker" in said
+    gone, too = (Source(str(tmp_path / name), True) for name in ("gone", "too"))
+    causes = []
+    for source, place in ((gone, data.url), (too, data.url), (here, str(tmp_path / "elsewhere"))):
+        outcome = work.process(source, "mark", recipe, place, run_verb)
+        assert "no such folder on the worker" in outcome.failed
+        causes.append(outcome.rows["failures"][0]["cause"])
+    assert causes[0] == causes[1]  # one line for both
     assert not (tmp_path / "elsewhere").exists()
 
 
