@@ -101,7 +101,7 @@ def scheduler(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
 
 
 def test_a_killed_scheduler_and_then_the_same_again(
-    many: Path, tmp_path: Path, client: Client
+    many: Path, tmp_path: Path, client: Client, caplog: pytest.LogCaptureFixture
 ) -> None:
     out = tmp_path / "out"
     with scheduler(tmp_path) as (address, process):
@@ -114,6 +114,7 @@ def test_a_killed_scheduler_and_then_the_same_again(
             first.wait_for_workers(1, timeout=PATIENCE)
             with pytest.raises(SchedulerLostError, match="the scheduler went away"):
                 run(many, out, first, kill)
+    assert "Traceback" not in caplog.text
     assert 0 < len(finished(out)) < COUNT
     counts = run(many, out, client)
     assert counts.failed == 0

@@ -13,6 +13,7 @@ from tests.bench.browser import chromium
 from tests.bench.programs import PATIENCE
 from tirelib.fleet.dataset import DataSet
 from tirelib.fleet.page import fleet_document, write_fleet_page
+from tirelib.report.fleet import NOT_YET
 
 TIRES = 12
 DAYS = 9
@@ -195,7 +196,9 @@ def test_campaigns_of_one_name_are_told_apart_and_negative_answers_shown(tmp_pat
     assert names == ["day 0 (a) (/data/north/a)", "day 0 (a) (/data/south/a)", "day 0 (b)"]
     (negative,) = found["negative"]
     assert (negative["name"], negative["first"]) == (names[2], "runs.csv: missing; write one")
-    assert "runs.csv: missing" in Path(write_fleet_page(data)).read_text()
+    page = Path(write_fleet_page(data)).read_text()
+    assert "runs.csv: missing" in page
+    assert all(said in page for said in NOT_YET.values())  # nothing is said to be in order
 
 
 def test_a_click_on_a_point_opens_its_campaign(data: DataSet) -> None:
@@ -209,6 +212,7 @@ def test_a_click_on_a_point_opens_its_campaign(data: DataSet) -> None:
         text = page.inner_text("main")
         assert "tire 04 (radial_stiffness)" in text
         assert "the tire loses pressure" in text
+        assert "not known" not in text
         page.locator("#plot-parameter-1").scroll_into_view_if_needed()
         point = page.locator("#plot-parameter-1 .scatterlayer .point").nth(3)
         box = point.bounding_box()

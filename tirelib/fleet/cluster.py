@@ -8,6 +8,7 @@ from multiprocessing import resource_tracker
 
 import dask.config
 from distributed import Client, LocalCluster
+from distributed.utils import silence_logging_cmgr
 
 from tirelib import __version__
 from tirelib.errors import FormatError
@@ -74,6 +75,12 @@ def cluster(address: str | None, workers: int | None) -> Iterator[Client]:
                 stack.callback(_closed, client)
             yield client
         return
+    with silence_logging_cmgr(logging.CRITICAL):  # that a scheduler went away is said by the engine
+        yield from _clients(address)
+
+
+def _clients(address: str) -> Iterator[Client]:
+    """Yield a client of the scheduler at the address."""
     try:
         client = Client(address, timeout=CONNECT)
     except (OSError, ValueError) as error:
@@ -82,7 +89,13 @@ def cluster(address: str | None, workers: int | None) -> Iterator[Client]:
             "scheduler` prints, tcp://HOST:PORT, or leave the option out for one on this machine"
         ) from None
     with client:
-        versions = client.run(_version)
+        try:
+            versions = client.run(_version)
+        except Exception as error:  # whatever an environment of somebody else's raises
+            raise FormatError(
+                f"--scheduler {address}: a worker cannot run tirelib ({error}); install tirelib "
+                f"{__version__} with the extra fleet where the workers start"
+            ) from None
         odd = {worker: found for worker, found in versions.items() if found != __version__}
         if odd:
             raise FormatError(

@@ -41,11 +41,13 @@ LARGEST_P = FALSE_ALARM
 def fleet_document(data: DataSet) -> dict[str, Any]:
     """Return what stands out, what changes, what is joined, what is missing and what failed."""
     columns = ["container_id", "task", "name", "tire", "start_ts", "page", "answer", "file_path"]
-    rows = _told_apart(data.table("container_metrics", columns).to_pylist())
+    rows = data.table("container_metrics", columns).to_pylist()
     copies = _tags(data, ALSO_AT)
-    containers = {
-        row["container_id"]: row | {"copies": copies[row["container_id"]]} for row in rows
-    }
+    for row in rows:  # which of the copies was first depends on the workers
+        places = [row["file_path"], *copies.get(row["container_id"], ())]
+        row["file_path"], *row["copies"] = sorted(set(places))
+    rows = sorted(_told_apart(rows), key=_known_as)
+    containers = {row["container_id"]: row for row in rows}
     sizes = {container: values[0] for container, values in _tags(data, "size").items()}
     return {
         "format": "tirelib-fleet-page/1",
@@ -111,6 +113,7 @@ def _parameters(
             by_name[sizes.get(row["container_id"], ""), row["name"]].append(row)
     found = []
     for (size, name), rows in sorted(by_name.items()):
+        rows.sort(key=lambda row: _known_as(containers[row["container_id"]]))
         values = np.array([row["value"] for row in rows])
         stds = np.array([row["std"] for row in rows])
         spread = spread_of(values, stds, len(by_name))
@@ -238,7 +241,11 @@ def _same_order(rows: list[tuple[int, float, str]], ids: list[int]) -> FloatArra
 
 def _effects(data: DataSet, containers: Mapping[int, Any]) -> list[dict[str, Any]]:
     """Return the verdict of each diagnosed container, with what is named and hinted at."""
-    verdicts = _results(data, "diagnose", "verdict", ["name", "flags", "text"])
+    found = _results(data, "diagnose", "verdict", ["name", "flags", "text"])
+    verdicts = sorted(
+        (row for row in found if row["container_id"] in containers),
+        key=lambda row: _known_as(containers[row["container_id"]]),
+    )
     hints: dict[int, list[str]] = defaultdict(list)
     for row in _results(data, "diagnose", "effect", ["name", "flags"]):
         if row["flags"] == "hint":
@@ -254,7 +261,6 @@ def _effects(data: DataSet, containers: Mapping[int, Any]) -> list[dict[str, Any
             "hints": hints[row["container_id"]],
         }
         for row in verdicts
-        if row["container_id"] in containers
     ]
 
 

@@ -182,8 +182,8 @@ def _check_seen(source: Source, data: DataSet) -> None:
     ):
         if not seen:
             raise FormatError(
-                f"{url}: no such folder on the worker {socket.gethostname()}; a path must be the "
-                "same folder on every machine: give a shared file system or a URL"
+                f"{url}: no such folder on the worker's machine; a path must be the same folder on "
+                f"every machine, {socket.gethostname()} too: give a shared file system or a URL"
             )
 
 

@@ -19,6 +19,8 @@ from tirelib.report.style import BLUE, FAINT, ORANGE, RED
 
 MOST_ROWS = 200
 """Rows of a table on the page; the tables of the data set have all."""
+NOT_YET = {task: f"not known: {task} has not run" for task in ("identify", "estimate", "diagnose")}
+"""What stands in the place of a result that nobody has asked for."""
 
 
 def write_fleet(
@@ -57,13 +59,16 @@ def _lines(document: Mapping[str, Any]) -> list[tuple[str, str]]:
     named = Counter(name for each in document["effects"] for name in each["named"])
     failed = sum(each["number"] for each in document["failures"])
     gains = [row["gain"] for each in document["parameters"] for row in each["joined"]]
+    count = ", ".join(f"{name} in {count}" for name, count in named.most_common())
+    usual = "no tire, beyond its interval and the scatter of the others"
+    still = "none, beyond the scatter of the recordings"
     lines = [
-        ("Stand out", _some(odd) or "no tire, beyond its interval and the scatter of the others"),
-        ("Change with time", _some(changing) or "none, beyond the scatter of the recordings"),
+        ("Stand out", _some(odd) or (usual if document["parameters"] else NOT_YET["identify"])),
         (
-            "Effects",
-            ", ".join(f"{name} in {count}" for name, count in named.most_common()) or "none named",
+            "Change with time",
+            _some(changing) or (still if document["changes"] else NOT_YET["estimate"]),
         ),
+        ("Effects", count or ("none named" if document["effects"] else NOT_YET["diagnose"])),
         ("Failed", f"{failed}, see the causes below" if failed else "none"),
     ]
     if document["negative"]:
@@ -197,7 +202,7 @@ def _changes(changes: Sequence[Mapping[str, Any]]) -> Part:
     )
     by_channel: dict[str, list[Mapping[str, Any]]] = {}
     for each in changes:
-        if len(each["values"]) > 1:
+        if len(each["values"]) > 1 and any(each["values"]):
             by_channel.setdefault(each["channel"], []).append(each)
     plots = [_change_plot(channel, series) for channel, series in by_channel.items()]
     text = (
@@ -270,7 +275,7 @@ def _effects(effects: Sequence[Mapping[str, Any]]) -> Part:
             Plot(
                 "effects",
                 "Effects by tire",
-                "Red: named. Blue: a hint. Grey: neither. ",
+                "Orange: named. Blue: a hint. Grey: neither. ",
                 figure,
                 ("tire", "effect", "level"),
                 rows,
@@ -332,7 +337,7 @@ def _failures(failures: Sequence[Mapping[str, Any]]) -> Part:
         {
             "task": lambda each: each["task"],
             "cause": lambda each: each["cause"],
-            "first message": lambda each: each["message"].splitlines()[0][:160],
+            "first message": lambda each: each["message"].splitlines()[0],
             "where": lambda each: (
                 ", ".join(path.rpartition("/")[2] for path in each["paths"][:3])
                 + (", ..." if len(each["paths"]) > 3 else "")
@@ -351,7 +356,7 @@ def _negative(negative: Sequence[Mapping[str, Any]]) -> Part:
         negative[:MOST_ROWS],
         {
             **_WHICH,
-            "first reason": lambda each: each["first"].partition(";")[0][:160],
+            "first reason": lambda each: each["first"].partition(";")[0],
             "reasons": lambda each: str(each["reasons"]),
         },
         texts=4,

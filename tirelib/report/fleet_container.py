@@ -64,7 +64,7 @@ def _results(results: Sequence[Mapping[str, Any]]) -> Table:
         [
             row["kind"],
             row["name"],
-            (row.get("text") or "")[:200],
+            row.get("text") or "",
             (row.get("flags") or "").replace(";", ", "),
             row.get("unit") or "",
             number(row["value"]),
