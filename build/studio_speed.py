@@ -4,9 +4,9 @@
     python build/studio_speed.py touch DIR      hover, tick, cancel, and 200 runs made of DIR's runs
     python build/studio_speed.py memory DIR     memory over 100 refits
 
-Times are by the clock, with the machine's load beside them and the processor time of the jobs, for
-a clock tells little on a machine that others use. A refit of forces is the shortest: give `memory`
-a campaign of forces.
+Each time is printed with the machine's load, because other programs slow the jobs down. For the
+first view the processor time of the jobs is printed as well. Give `memory` a campaign of forces,
+whose refits are the shortest.
 """
 
 import argparse

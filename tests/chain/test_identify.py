@@ -36,13 +36,29 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def files(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("out")
-    out = {"model": folder / "M.toml", "json": folder / "I.json"}
-    found = CliRunner().invoke(
-        program, ["identify", str(campaign), "--out", str(out["model"]), "--json", str(out["json"])]
-    )
+    out = {name: folder / name for name in ("model", "json", "first")}
+    words = ["--out", str(out["model"]), "--json", str(out["json"]), "--first", str(out["first"])]
+    found = CliRunner().invoke(program, ["identify", str(campaign), *words])
     assert found.exit_code == 0, found.output
     assert "4 straight runs, 5 of 5 gages averaged" in found.output
     return out
+
+
+def test_the_ring_before_its_intervals_is_compared_as_the_whole_model(
+    campaign: Path, files: dict[str, Path], tmp_path: Path
+) -> None:
+    told = []
+    for name in ("first", "model"):
+        words = ["--model", str(files[name]), "--json", str(tmp_path / name)]
+        found = CliRunner().invoke(program, ["compare", str(campaign), *words])
+        assert found.exit_code == 0, found.output
+        told.append((tmp_path / name).read_text())
+    assert told[0] == told[1]
+    first, whole = (read_tire(str(files[name])).numbers for name in ("first", "model"))
+    assert {name: number.value for name, number in first.items()} == {
+        name: number.value for name, number in whole.items()
+    }
+    assert "interval" not in files["first"].read_text()
 
 
 def test_a_gage_without_numbers_is_warned_of_before_the_results(

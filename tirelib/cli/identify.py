@@ -16,6 +16,7 @@ from tirelib.cli.progress import is_verbose, progress_bar, progress_options
 
 if TYPE_CHECKING:
     from tirelib.identify.whole import Whole
+    from tirelib.parameters import TireFile
 
 BASES = ("plain", "dissertation")
 
@@ -58,6 +59,14 @@ whose interval is wider than 25 % to either side, with the test that would deter
     required=True,
     help="File for the identified model, which the other commands read.",
 )
+@click.option(
+    "--first",
+    "first",
+    metavar="FIRST.toml",
+    type=NEW_FILE,
+    help="File for the ring as soon as it is fitted, before intervals, advice and forces. `tirelib "
+    "compare` reads it and gives what it gives of M.toml.",
+)
 @json_option()
 @progress_options
 @click.pass_context
@@ -67,6 +76,7 @@ def identify(
     tire_file: str | None,
     base: str,
     out: Path,
+    first: Path | None,
     json_file: Path | None,
 ) -> None:
     """Fit the base model, ring and brush, to DIR."""
@@ -76,8 +86,16 @@ def identify(
 
     start = read_tire(tire_file) if tire_file is not None else None
     campaign = read_campaign(folder)
+
+    def found(ring: "TireFile") -> None:
+        progress("the ring is fitted; its intervals follow")
+        if first is not None:
+            new = first.with_name(f".{first.name}.new")
+            write_tire(ring, new, "tirelib-model/1")
+            new.replace(first)  # whoever waits for it never reads a part
+
     with progress_bar("identifying") as progress:
-        whole = identify_whole(campaign, start, base=base, progress=progress)
+        whole = identify_whole(campaign, start, base=base, progress=progress, found=found)
     document = whole_document(campaign, whole) | _errors(campaign, whole)
     write_tire(whole.file, out, "tirelib-model/1")
     console = output()

@@ -8,7 +8,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
 from tirelib.identify.estimate import Estimate
-from tirelib.identify.identify import Identification
+from tirelib.identify.identify import WITHOUT_EFFECTS, Identification
 from tirelib.parameters import FIELDS, TireFile
 from tirelib.ring.frequencies import rim_stiffness
 from tirelib.units import from_si
@@ -86,8 +86,6 @@ def model_file(found: Identification) -> TireFile:
             "names": [each.name for each in found.estimates],
             "values": found.correlation.tolist(),
         },
-        "model": {"ring": "large displacements", "contact": "radial"},
-        "effects": [],
-        "history": [],
+        **WITHOUT_EFFECTS,
     }
     return replace(found.tire, extra=extra)

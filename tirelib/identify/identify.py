@@ -1,8 +1,11 @@
 """Identify a tire from a campaign: every number with an interval, and what it would take."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from math import nan
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +34,12 @@ TOLD = 0.6
 
 BASES = ("plain", "dissertation")
 """The plain tire, and the ring whose belt does not shear on a road without friction."""
+WITHOUT_EFFECTS: Mapping[str, Any] = {
+    "model": {"ring": "large displacements", "contact": "radial"},
+    "effects": [],
+    "history": [],
+}
+"""What a model file holds beyond its numbers while no effect has been added."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +75,7 @@ def identify(
     base: str = "plain",
     waves: Waveforms | None = None,
     progress: Callable[[str], None] | None = None,
+    found: Callable[[TireFile], None] | None = None,
 ) -> Identification:
     """Identify the base model from the straight runs of a campaign.
 
@@ -80,6 +90,8 @@ def identify(
         Of the campaign, when they have been read already.
     progress : callable, optional
         Called with a label after each run and step.
+    found : callable, optional
+        Called with the fitted tire before the intervals of its numbers are computed.
 
     Raises
     ------
@@ -90,8 +102,13 @@ def identify(
     """
     waves = waves or measure_waveforms(campaign, progress=progress)
     runs = straight_runs(waves)
+
+    def tell(start: TireFile, values: Mapping[str, float | FloatArray]) -> None:
+        if found is not None:
+            found(_without_intervals(start, values, campaign, runs))
+
     try:
-        start, fit, estimates = estimated(runs, tire, base=base, progress=progress)
+        start, fit, estimates = estimated(runs, tire, base=base, progress=progress, found=tell)
     except TirelibError as error:
         error.args = (_with_run(str(error), runs),)
         raise
@@ -141,10 +158,12 @@ def estimated(
     *,
     base: str = "plain",
     progress: Callable[[str], None] | None = None,
+    found: Callable[[TireFile, Mapping[str, float | FloatArray]], None] | None = None,
 ) -> tuple[TireFile, WaveformFit, tuple[Estimate, ...]]:
     """Return start and priors, the fit, and what it tells of every number.
 
-    Parameters and errors as in `identify`, for runs that have been read already.
+    Parameters and errors as in `identify`, for runs that have been read already; `found` is called
+    with the start and the fitted values.
     """
     start = start_file(runs.waves.header, runs, tire, base)
     values = values_of(start.tire)
@@ -157,6 +176,7 @@ def estimated(
         free=free,
         discrepancy=discrepancy,
         progress=progress,
+        found=None if found is None else partial(found, start),
     )
     estimates = [estimate(fit, k, start) for k in range(len(fit.free))]
     if any("not_identifiable" in e.flags for e in estimates):
@@ -314,7 +334,7 @@ def _fitted_file(
     fit: WaveformFit,
 ) -> TireFile:
     numbers = dict(start.numbers)
-    source = f"strain waveforms of {campaign.header.name}, {len(runs.waves)} straight runs"
+    source = _source(campaign, runs)
     for estimate in estimates:
         numbers[estimate.name] = Number(
             estimate.value, estimate.std, "fitted", source, estimate.notes
@@ -328,3 +348,21 @@ def _fitted_file(
         "rms_microstrain": 1e6 * fit.rms,
     }
     return TireFile(start.name, numbers, {"provenance": provenance})
+
+
+def _without_intervals(
+    start: TireFile,
+    values: Mapping[str, float | FloatArray],
+    campaign: Campaign,
+    runs: StraightRuns,
+) -> TireFile:
+    """Return the fitted tire while nothing more is known of it than its values."""
+    fitted = {
+        c.name: Number(float(values[c.name]), nan, "fitted", _source(campaign, runs))
+        for c in coordinates(values_of(start.tire))
+    }
+    return TireFile(start.name, {**start.numbers, **fitted}, dict(WITHOUT_EFFECTS))
+
+
+def _source(campaign: Campaign, runs: StraightRuns) -> str:
+    return f"strain waveforms of {campaign.header.name}, {len(runs.waves)} straight runs"

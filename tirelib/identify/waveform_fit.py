@@ -117,6 +117,7 @@ def fit_waveforms(
     changes: Changes = (),
     discrepancy: Discrepancy | None = None,
     progress: Callable[[str], None] | None = None,
+    found: Callable[[Mapping[str, float | FloatArray]], None] | None = None,
 ) -> WaveformFit:
     """Fit the free coordinates.
 
@@ -134,6 +135,8 @@ def fit_waveforms(
         None leaves the structural misfit out: smallest residual, intervals of noise alone.
     progress : callable, optional
         Called with a label after each step.
+    found : callable, optional
+        Called with the fitted values before their intervals are computed.
 
     Raises
     ------
@@ -148,6 +151,8 @@ def fit_waveforms(
         if progress is not None:
             progress(f"error {solver.cost.error(solver.model):.2f}")
         if moved < SETTLED:
+            if found is not None:
+                found(solver.values)
             return solver.result(steps)
     raise ConvergenceError(
         f"waveform fit: after {MAX_STEPS} steps the parameters still move by {moved:.2g} standard "

@@ -49,6 +49,7 @@ def identify_whole(
     *,
     base: str = "plain",
     progress: Callable[[str], None] | None = None,
+    found: Callable[[TireFile], None] | None = None,
 ) -> Whole:
     """Fit the ring to straight runs with strain, then the brush to runs with slip.
 
@@ -62,6 +63,8 @@ def identify_whole(
         Of the ring: the plain tire, or the dissertation's (`tirelib.identify.identify.BASES`).
     progress : callable, optional
         Called with a label at each step.
+    found : callable, optional
+        Called with the fitted ring before the intervals of its numbers are computed.
 
     Raises
     ------
@@ -75,7 +78,7 @@ def identify_whole(
     ring, failed = None, ""
     if campaign.header.gage_lateral:
         try:
-            ring = identify(campaign, known, base=base, progress=progress)
+            ring = identify(campaign, known, base=base, progress=progress, found=found)
             reasons += ring.notes
         except TirelibError as error:
             why = "; ".join([f"no ring: {error}", *broken_gages(campaign)])

@@ -76,6 +76,8 @@ def explained(
 
 def _missing(told: Mapping[str, Any]) -> str:
     named, verdict = list(told["named"]), told["verdict"]
+    if verdict == "none" and told["error_unit"] != "noise":
+        return "This is not known: without the noise of repeated runs no effect can be tested."
     if verdict == "none":
         return (
             "Nothing: these measurements need no effect of the catalogue in addition to the model."
@@ -206,7 +208,7 @@ def error_line(told: Mapping[str, Any]) -> str:
     before, after = told["error_before"], told["error_after"]
     raw = f"{unit_name(told['residual_rms_unit'])} rms"
     left = [number(told[f"residual_rms_{when}"], SENSE) for when in ("before", "after")]
-    rms = [f" ({size} {raw})" for size in left]
+    rms = [f" ({size} {raw})" if told["error_unit"] == "noise" else "" for size in left]
     changed = told.get("named") or told.get("action")
     if not changed:
         text = f"It is {_said(before)} {unit}{rms[0]}"

@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+FIRST = "first.toml"
+"""The fitted ring, which is compared while its intervals and the forces are still computed."""
 Order = Mapping[str, Any]
 """What a job is about: campaign, model, quantity, effect and so on, all as texts."""
 
@@ -119,7 +121,8 @@ KINDS: Mapping[str, Kind] = {
     "identify": Kind(
         "fit the base model",
         lambda o, out: [
-            *("identify", o["campaign"], "--out", f"{out}/M.toml", "--json", f"{out}/fit.json")
+            *("identify", o["campaign"], "--out", f"{out}/M.toml", "--json", f"{out}/fit.json"),
+            *(["--first", f"{out}/{FIRST}"] if o.get("first") else []),
         ],
         ("M.toml", "fit.json"),
         (0, 1),  # 1: the runs gave no ring, or no brush; what they gave counts

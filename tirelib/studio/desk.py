@@ -8,6 +8,7 @@ from typing import Any
 
 from tirelib.errors import ParameterError
 from tirelib.studio import intake
+from tirelib.studio.commands import FIRST
 from tirelib.studio.disk import read_document, write_atomic
 from tirelib.studio.jobs import Job, Jobs
 from tirelib.studio.receiving import Receiving
@@ -152,6 +153,22 @@ class Desk:
             if job.kind == "calibrate":
                 self.jobs.add("fmu", {"calibration": str(place / "CAL.toml")}, subject)
 
+    def first_fits(self) -> bool:
+        """Compare each ring that has just been fitted; return whether there is one."""
+        found = False
+        for job in list(self.jobs.all.values()):
+            if job.state != "running" or not (first := self.jobs.out(job) / FIRST).exists():
+                continue
+            opened = self.session.campaign(job.subject["campaign"])
+            model = opened.model(job.subject["model"])
+            known = first.replace(model.place / FIRST)
+            if (quantity := self._quantity(opened, model)) == "strain":
+                opened.change(current=model.number, quantity=quantity)
+                about = self._about(opened, model, quantity) | {"model": str(known)}
+                self.jobs.add("compare", about, {**job.subject, "quantity": quantity})
+                found = True
+        return found
+
     def _begin(self, opened: Opened) -> Opened:
         """Check a campaign that was opened, and read its runs: they may have changed."""
         subject = {"campaign": opened.name}
@@ -178,7 +195,7 @@ class Desk:
     def _identify(self, opened: Opened) -> None:
         model = opened.new_model(None, "identify", "", "")
         subject = {"campaign": opened.name, "model": model.number}
-        self.jobs.add("identify", {"campaign": opened.folder}, subject)
+        self.jobs.add("identify", {"campaign": opened.folder, "first": True}, subject)
 
     def _fit_again(self, wish: Mapping[str, Any]) -> None:
         """Fit another base model: to measurements that have changed since."""

@@ -217,6 +217,11 @@ class Jobs:
                 lines = (self.place(job) / name).read_text(errors="replace").splitlines()
                 lines = [line for line in lines if not line.startswith('{"progress"')]
                 said = said or "\n".join(lines).strip()[-TAIL:]
+        if "Traceback (most recent call last)" in said:
+            return (
+                f"tirelib has a fault of its own here ({said.splitlines()[-1]}). Nothing else is "
+                f"affected. Please report it with {self.place(job) / 'stderr.txt'}"
+            )
         return said.removeprefix("Error: ") or f"the command ended with exit code {code}"
 
     def _save(self, job: Job) -> None:

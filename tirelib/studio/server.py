@@ -99,9 +99,12 @@ class Studio:
                     self.desk.ended(job)
                 except (TirelibError, OSError) as error:
                     job.state, job.message = "failed", f"its results cannot be kept: {error}"
-            if ended:
+            first = False
+            with suppress(TirelibError, OSError):  # else its comparison comes with the whole fit
+                first = self.desk.first_fits()
+            if ended or first:
                 self.changed += 1
-            if news:
+            if news or first:
                 self.wake()
             await asyncio.sleep(TICK)
 

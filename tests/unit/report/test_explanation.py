@@ -84,6 +84,12 @@ def test_what_is_named_is_told_with_its_size_its_fall_and_the_command_that_adds_
     ]
 
 
+def test_an_error_in_its_own_unit_is_told_once() -> None:
+    changes = {"error_unit": "ustrain", "error_before": 84.26, "error_refitted": 84.26}
+    told = error_line(diagnosis(verdict="none", named=[], error_after=84.26, floor=None, **changes))
+    assert told.startswith("It is 84.3 microstrain.")
+
+
 def test_two_effects_that_are_named_together_are_added_together() -> None:
     """One of two alone may raise the error on what is held out: it was judged with the other."""
     told = explained(diagnosis(named=["damping", "shear"]), "M.toml", "DIR")
@@ -151,7 +157,11 @@ def test_what_does_not_fall_on_what_was_held_out_is_said() -> None:
             "a law is not right, or more is missing",
             "law of damping",
         ),
-        ({"error_unit": "ustrain", "verdict": "none", "named": []}, "Nothing", "measured twice"),
+        (
+            {"error_unit": "ustrain", "verdict": "none", "named": []},
+            "This is not known",
+            "measured twice",
+        ),
     ],
 )
 def test_every_verdict_has_its_words(changes: dict[str, Any], missing: str, sure: str) -> None:

@@ -1,6 +1,7 @@
 """`tirelib.studio.runner` whose jobs write at once what a command would write.
 
-While the file of the environment variable HOLD exists, fits go on; every command line is noted
+While the file of the environment variable HOLD exists, fits go on; a base fit tells its ring first
+if the file holds "first". An import with a map of the name "bad" fails. Every command line is noted
 in the file of the environment variable SAID.
 """
 
@@ -54,14 +55,19 @@ def work(words: Sequence[str]) -> None:
     with Path(os.environ["SAID"]).open("a") as said:
         said.write(json.dumps({"pid": os.getpid(), "argv": words}) + "\n")
     verb = words[1] if words[0] == "campaign" else words[0]
+    hold = Path(os.environ["HOLD"])
+    if (first := value(words, "--first")) and hold.exists() and hold.read_text() == "first":
+        first.write_text("model = 0\n")
     for step in range(1, 100000):
         label = f"error {9 - step}"
         told = {"progress": "fitting", "done": step, "total": None, "label": label}
         sys.stderr.write(json.dumps(told) + "\n")
-        if verb not in ("add", "identify") or not Path(os.environ["HOLD"]).exists():
+        if verb not in ("add", "identify") or not hold.exists():
             break
         time.sleep(0.02)
-    if "sidewall_pressure" in words or (verb == "diagnose" and "Fy" in words):
+    map_file = value(words, "--map")
+    bad = map_file is not None and 'name = "bad"' in map_file.read_text()
+    if bad or "sidewall_pressure" in words or (verb == "diagnose" and "Fy" in words):
         sys.stderr.write("Error: it does not fit; choose another\n")
         sys.exit(2)
     if target := value(words, "--json"):
@@ -73,6 +79,9 @@ def work(words: Sequence[str]) -> None:
         np.savez(target, **(arrays | _measured(arrays["angle"]) if verb == "show" else arrays))
     if (target := value(words, "--out")) and target.suffix == ".toml":
         target.write_text("model = 1\n")
+    elif target and verb == "import":
+        target.mkdir()
+        (target / "campaign.toml").write_text("x = 1\n")
 
 
 def _measured(angle: Any) -> dict[str, Any]:

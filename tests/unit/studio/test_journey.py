@@ -48,6 +48,32 @@ def test_opening_a_campaign_leads_to_a_verdict_and_the_page_gets_what_the_comman
     assert verbs(served).count("diagnose") == 1  # nothing is computed twice
 
 
+def test_a_fitted_ring_is_compared_before_its_intervals_are_known(served: Served) -> None:
+    served.hold.write_text("first")  # the fit goes on after its ring was told
+    name = served.do(do="open", path=str(served.measured))[1]["campaign"]
+    until(lambda: "strain/plots.npz" in str(served.campaign(name)["models"]))
+    told = served.campaign(name)
+    model = told["models"][0]
+    assert (told["current"], told["quantity"]) == ("001", "strain")
+    assert (model["ready"], model["error"]) == (False, 15.25)
+    served.hold.unlink()
+    until(lambda: served.campaign(name)["models"][0]["verdict"])
+    assert verbs(served).count("compare") == 1
+    whole = next(each["argv"] for each in served.said() if each["argv"][0] == "diagnose")
+    assert whole[whole.index("--model") + 1].endswith("M.toml")
+
+
+def test_a_fault_of_the_program_itself_is_told_without_its_traceback(tmp_path: Path) -> None:
+    jobs = Jobs(tmp_path, RUNNER)
+    job = jobs.add("check", {"campaign": "c"}, {})
+    said = "Traceback (most recent call last):\n  File x, line 1\nValueError: no such run\n"
+    (jobs.place(job) / "stderr.txt").write_text(said)
+    jobs._finish(job, 1)
+    assert job.message.startswith("tirelib has a fault of its own here (ValueError: no such run).")
+    assert "Traceback" not in job.message
+    assert str(jobs.place(job) / "stderr.txt") in job.message
+
+
 def test_two_ticked_effects_are_added_one_after_the_other_and_undo_goes_back(
     served: Served, opened: str
 ) -> None:

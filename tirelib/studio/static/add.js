@@ -1,6 +1,6 @@
 // Step 4: the refit while it runs, the fall of the error, and every model that was made.
 import { compareModels } from "./compare.js";
-import { app, current, failedOf, nameOf, progressOf, VERDICTS, wish } from "./data.js";
+import { app, current, failedOf, nameOf, progressOf, verdictOf, wish } from "./data.js";
 import { csvButton, fill, h, number, strength, unitName } from "./dom.js";
 import { Plot, waterfall } from "./plots.js";
 
@@ -43,7 +43,7 @@ export class Add {
     const job = this.fitting().find((one) => one.state === "running"), at = job && progressOf(job.job);
     if (!at || !this.text) return;
     this.text.textContent = at.label ? `${at.label} (step ${at.done})` : "begins";
-    if (at.errors.length > 1) this.plot.show({ ...MEASURES[at.measure], x: { title: "step", values: at.errors.map((_, i) => i + 1) }, series: [{ name: at.measure, values: at.errors, color: "model" }] });
+    if (at.errors.length > 1) this.plot.show({ ...MEASURES[at.measure], x: { title: "step", whole: true, values: at.errors.map((_, i) => i + 1) }, series: [{ name: at.measure, values: at.errors, color: "model" }] });
   }
 
   update() {
@@ -86,9 +86,9 @@ export class Add {
     fill(this.fall, h("div", { class: "row" }, h("h2", {}, "The fall of the error"), h("span", { class: "quiet" }, c.quantity), h("span", { class: "room" }),
       csvButton("waterfall", () => [["step", steps.map((s) => s.name)], [`error [${unit}]`, steps.map((s) => s.error)], ["held-out error", steps.map((s) => s.heldout)], ["floor", steps.map((s) => s.floor)]])),
     steps.length ? waterfall(steps, unit) : h("p", { class: "quiet" }, "There is no model yet."),
-    last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(last.std, 2)}${last.unit === "1" ? "" : ` ${last.unit}`}. Error ${number(last.error_before, 4)} before, `, h("b", { id: "error-after" }, number(last.error_after, 4)), ` after [${unitName(last.error_unit)}]. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after${last.held_out?.length ? `; of it ${heldOut(last)}` : ""}.`) : null,
+    last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(last.std, 2)}${last.unit === "1" ? "" : ` ${unitName(last.unit)}`}. Error ${number(last.error_before, 4)} before, `, h("b", { id: "error-after" }, number(last.error_after, 4)), ` after [${unitName(last.error_unit)}]. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after${last.held_out?.length ? `; of it ${heldOut(last)}` : ""}.`) : null,
     last?.flags?.length ? h("p", { class: "warn" }, last.flags.map((flag) => FLAGS[flag] || flag.replaceAll("_", " ")).join(" ")) : null,
-    now?.verdict ? h("p", {}, "The verdict with this model: ", h("b", {}, VERDICTS[now.verdict] || now.verdict), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", h("a", { href: `#/suspect/${app.wanted}` }, "See the suspects again")) : now ? noVerdict(c) : null,
+    now?.verdict ? h("p", {}, "The verdict with this model: ", h("b", {}, verdictOf(now.verdict, now.error_unit)), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", h("a", { href: `#/suspect/${app.wanted}` }, "See the suspects again")) : now ? noVerdict(c) : null,
     failed.map((job) => h("p", { class: job.state === "failed" ? "bad" : "warn" }, `${job.kind} ${job.effect}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: job.job }) }, "Run again"))));
     const shown = c.models.filter((m) => m.ready && (this.hidden || !m.hidden));
     fill(this.strip, h("div", { class: "row" }, h("h2", {}, "Models"), h("span", { class: "quiet small" }, "Nothing is deleted. Continue from any of them."), h("span", { class: "room" }),
@@ -103,7 +103,7 @@ export class Add {
     const name = h("input", { value: m.label, placeholder: nameOf(m), "aria-label": `label of model ${m.number}`, size: 16, onchange: () => mark({ label: name.value }) });
     const before = c.models.find((one) => one.number === m.parent);
     return h("div", { class: `model${m.number === c.current ? " current" : ""}${m.hidden ? " hidden-model" : ""}`, "data-model": m.number },
-      h("div", { class: "name" }, `${m.pinned ? "📌 " : ""}${nameOf(m)}`), h("div", { class: "small quiet" }, before ? `from ${nameOf(before)}` : "the start"),
+      h("div", { class: "name" }, nameOf(m), m.pinned ? [" ", h("span", { class: "tag" }, "pinned")] : null), h("div", { class: "small quiet" }, before ? `from ${nameOf(before)}` : "the start"),
       h("div", {}, `error ${number(m.error ?? m.fit?.error_after)} `, h("span", { class: "quiet" }, unitName(m.error_unit || m.fit?.error_unit))), name,
       h("div", { class: "row" }, m.number === c.current ? h("span", { class: "tag" }, "shown") : h("button", { class: "small", type: "button", onclick: () => this.look(m) }, "Continue from here"),
         h("button", { class: "small", type: "button", onclick: () => mark({ pinned: !m.pinned }) }, m.pinned ? "Unpin" : "Pin"), h("button", { class: "small", type: "button", onclick: () => mark({ hidden: !m.hidden }) }, m.hidden ? "Show" : "Hide")));

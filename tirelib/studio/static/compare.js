@@ -1,5 +1,5 @@
 // Two models side by side: their errors, what each leaves as a map in one scale, and every run.
-import { arraysOf, documentOf, nameOf, VERDICTS } from "./data.js";
+import { arraysOf, documentOf, nameOf, verdictOf } from "./data.js";
 import { choose, csvButton, dialog, fill, h, number, strength, unitName } from "./dom.js";
 import { Heat, limitOf } from "./heat.js";
 import { BINS, forceRows, isStrain, niceTicks, strainRows, unitOf } from "./maps.js";
@@ -21,7 +21,7 @@ const LINES = [
   ["error", (t) => t && `${number(t.error, 4)} ${unitName(t.error_unit)}`],
   ["not explained, rms", (t) => t && `${number(t.residual_rms)} ${unitName(t.unit)}`],
   ["effects", (t) => t && (t.effects.map((e) => `${e.effect} ${strength(e.strength)}`).join("; ") || "none")],
-  ["verdict", (_, m) => VERDICTS[m.verdict] || m.verdict],
+  ["verdict", (_, m) => verdictOf(m.verdict, m.error_unit)],
   ["held-out error", (_, m) => m.fit?.heldout_error_after && number(m.fit.heldout_error_after, 4)],
 ];
 

@@ -55,15 +55,21 @@ export async function refresh() {
 }
 
 // The verdicts of a diagnosis in plain words.
-export const VERDICTS = {
+const VERDICTS = {
   none: "no effect is missing", named: "one effect is missing", indistinguishable: "several effects explain it alike",
   form_inadequate: "the effect is right, its law is not", unknown: "no effect of the catalogue explains it",
 };
+
+// Where nothing was measured twice there is no noise, and no effect has been tested.
+export const verdictOf = (verdict, unit) => (verdict && unit && unit !== "noise" ? "not tested: nothing was measured twice" : VERDICTS[verdict] || verdict);
 
 export const current = () => {
   const c = app.campaign;
   return c ? c.models.find((m) => m.number === c.current && m.ready) || null : null;
 };
+
+// The same, or a base model that can be seen already while the rest of its fit is computed.
+export const inView = () => current() || app.campaign?.models.find((m) => m.number === app.campaign.current && m.documents[`${app.campaign.quantity}/plots.npz`]) || null;
 
 export function nameOf(model) {
   if (model.label) return model.label;
@@ -76,6 +82,13 @@ export const active = () => [...(app.campaign?.jobs || []), ...(app.home?.jobs |
   .filter((job) => ["waiting", "running"].includes(job.state));
 // What a job says of its last step; while a fit runs, its error is weighted otherwise than the error of a model.
 export const labelOf = (at) => at?.label.replace(/^error /, "weighted residual ");
+// How long a job has run, and how long it may still take if the last one of its kind in this campaign is a guide.
+export function timeOf(job) {
+  if (!job.begun || job.state !== "running") return "";
+  const words = (x) => (x < 100 ? `${Math.round(x)} s` : `${Math.round(x / 60)} min`), took = Date.now() / 1000 - job.begun;
+  const before = (app.campaign?.jobs || []).filter((one) => one.kind === job.kind && one.state === "done").at(-1), left = before ? before.ended - before.begun - took : 0;
+  return `${words(Math.max(0, took))}${left > 1 ? `, about ${words(left)} left if it takes as long as the last time` : ""}`;
+}
 export const progressOf = (number) => app.running.find((one) => one.job === number);
 
 // The last job of a kind on what is looked at, if it has failed or was ended: the user goes on without its result.

@@ -10,7 +10,7 @@ new MutationObserver(() => live.forEach((plot) => plot.renew())).observe(documen
 const axis = (label, extra = {}) => ({
   stroke: () => color("quiet"), grid: { stroke: () => color("grid"), width: 1 }, ticks: { stroke: () => color("line"), width: 1 },
   font: `${large() ? 16 : 12}px system-ui, sans-serif`, labelFont: `${large() ? 16 : 12}px system-ui, sans-serif`,
-  label, labelSize: large() ? 24 : 18, size: large() ? 66 : 52, ...extra,
+  label, labelSize: large() ? 24 : 18, size: large() ? 76 : 62, ...extra,
 });
 
 // series: [{name, values, color, dash, points, width, fill}], bands: [[upper, lower, color]]
@@ -42,14 +42,14 @@ export class Plot {
 
   make(data) {
     this.plot?.destroy();
-    fill(this.legend, this.told.series.filter((one) => !one.quiet).map((one) => { const mark = h("i", { class: one.points ? "dot" : one.dash ? "dash" : "" }); mark.style.borderColor = color(one.color); return h("span", {}, mark, one.points ? `${one.hollow ? "○" : "●"} ` : "", one.name); }));
+    fill(this.legend, this.told.series.filter((one) => !one.quiet).map((one) => { const mark = h("i", { class: one.points ? "dot" : one.dash ? "dash" : "" }); mark.style.borderColor = color(one.color); const dot = h("b", {}, one.points ? `${one.hollow ? "○" : "●"} ` : ""); dot.style.color = color(one.color); return h("span", {}, mark, dot, one.name); }));
     const { told } = this;
     this.made = large();
     this.plot = new uPlot({
       width: Math.max(200, this.place.clientWidth || 500), height: this.height, legend: { show: false },
       cursor: { drag: { x: Boolean(this.select), y: false, setScale: false }, points: { show: !this.points }, dataIdx: undefined },
       scales: { x: { time: false, range: told.x.range ? () => told.x.range : undefined } },
-      axes: [axis(told.x.title, { size: large() ? 44 : 34 }), axis(told.y || told.unit)],
+      axes: [axis(told.x.title, { size: large() ? 44 : 34, ...(told.x.whole ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200] } : {}) }), axis(told.y || told.unit)],
       bands: (told.bands || []).map(([upper, lower, paint]) => ({ series: [upper, lower], fill: () => `${color(paint)}2e` })),
       series: [{ label: told.x.title }, ...told.series.map((one) => ({
         label: one.name, stroke: () => color(one.color), width: one.width ?? 2, dash: one.dash,

@@ -1,5 +1,5 @@
 // Step 2: where the model fails: a map of what is left, the chosen run, and any number over any condition.
-import { active, app, arraysOf, current, documentOf, labelOf, measured, progressOf, VERDICTS, wish } from "./data.js";
+import { active, app, arraysOf, current, documentOf, inView, labelOf, measured, progressOf, timeOf, verdictOf, wish } from "./data.js";
 import { choose, csvButton, fill, h, number, unitName } from "./dom.js";
 import { Heat, limitOf } from "./heat.js";
 import { Plot } from "./plots.js";
@@ -29,10 +29,11 @@ export class Field {
     return this.take(key, await arraysOf(model, "plots"));
   }
 
-  // What was measured, while there is no model yet.
+  // What was measured, while there is no model yet; of another quantity than the one that was chosen it is not shown.
   async loadMeasured() {
-    const key = `${app.campaign.campaign}/measured/${app.campaign.measured}`;
-    return key === this.key ? Boolean(this.data) : this.take(key, await measured());
+    const key = `${app.campaign.campaign}/measured/${app.campaign.measured}`, data = await measured();
+    if (current() && data?.texts.quantity !== app.campaign.quantity) return false;
+    return key === this.key ? Boolean(this.data) : this.take(key, data);
   }
 
   take(key, data) {
@@ -90,7 +91,7 @@ export class Field {
     if (!range) { this.said.textContent = `${isStrain(data) ? (data.edges ? "The thin lines are the edges of the model's contact. " : "") : "Where the map is grey, nothing was measured. "}Drag over the map or the plot (at the keyboard: Shift with the arrow keys) to see the rms of a range and its share of the squares.`; return; }
     const at = (k) => this.x.low + ((k + 0.5) * (this.x.high - this.x.low)) / this.columns;
     const found = share(data, this.value, this.rows, (k) => at(k) >= range[0] && at(k) <= range[1], data.counted);
-    this.said.textContent = `From ${number(range[0])} to ${number(range[1])}: rms ${number(found.rms)} ${this.unit}, ${number(100 * found.share, 3)} % of the squares, ${found.count} values.`;
+    this.said.textContent = `From ${number(range[0])} to ${number(range[1])}${isStrain(data) || this.slip.key === "slip_angle" ? " deg" : ""}: rms ${number(found.rms)} ${this.unit}, ${number(100 * found.share, 3)} % of the squares, ${found.count} values.`;
   }
 
   overlay(trace) { this.trace = trace; this.build(); this.detail(); }
@@ -132,7 +133,7 @@ export class See {
   }
 
   async update() {
-    const model = current();
+    const model = inView();
     const compared = model && (await documentOf(model, "comparison").catch(() => null));
     const before = this.fitted;
     this.fitted = Boolean(compared && (await this.field.load(model).catch(() => false)));
@@ -149,7 +150,7 @@ export class See {
       h("div", { class: "figures" }, h("div", {}, h("span", { class: "quiet" }, "error of the model"), h("b", { id: "error" }, number(c.error, 4)), h("span", { class: "quiet" }, unitName(c.error_unit))),
         h("div", {}, h("span", { class: "quiet" }, "not explained, rms"), h("b", {}, number(c.residual_rms, 3)), h("span", { class: "quiet" }, `of ${number(c.measured_rms, 3)} ${unitName(c.unit)}`)),
         c.noise ? h("div", {}, h("span", { class: "quiet" }, "noise of the repeats"), h("b", {}, number(c.noise, 3)), h("span", { class: "quiet" }, unitName(c.unit))) : null,
-        h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, VERDICTS[model.verdict] || (c.verdict === "fits" ? "the model fits" : "not known yet")), h("span", { class: "quiet" }, c.verdict === "fits" ? "what is left is noise" : "what is left is more than noise"))),
+        h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, verdictOf(model.verdict, c.error_unit) || (c.verdict === "fits" ? "the model fits" : "not known yet")), h("span", { class: "quiet" }, !c.noise ? "the noise is not known" : c.verdict === "fits" ? "what is left is noise" : "what is left is more than noise"))),
       h("span", { class: "room" }), h("button", { class: "main", type: "button", onclick: () => this.go("suspect") }, "Find what is missing")),
     said.length ? h("details", {}, h("summary", {}, `Where it fails, in words (${said.length})`), h("ul", {}, said.map((s) => h("li", {}, s)))) : null);
     this.plots();
@@ -245,7 +246,8 @@ export function wait(place, kinds = ["check", "identify", "compare"]) {
   fill(place, h("h2", {}, running.length ? "Being computed" : broken ? "It could not be computed" : "Nothing to be seen yet"),
     running.length && !model ? h("p", { class: "quiet" }, "The campaign is checked, then the base model is fitted to it and compared with it. For 66 runs that takes about 15 s on an idle machine; the page then shows it by itself. What was measured needs no model: step 2 shows it as soon as the runs are read.") : null,
     c.check?.errors ? h("p", { class: "bad" }, `The campaign has ${c.check.errors} ${c.check.errors === 1 ? "error" : "errors"}: `, h("a", { href: `#/open/${c.campaign}` }, "step 1 lists them with what to do"), ".") : null,
-    running.map((job) => { const at = progressOf(job.job); return h("p", {}, `${job.title}: ${job.state === "running" ? labelOf(at) || "begins" : "waits"}`); }),
+    running.map((job) => { const at = progressOf(job.job); return h("p", {}, `${job.title}: ${job.state === "running" ? [labelOf(at) || "begins", timeOf(job)].filter(Boolean).join("; ") : "waits"}`); }),
+    model && running.some((job) => job.kind === "diagnose") ? h("p", { class: "quiet" }, "A diagnosis tries the effects of the catalogue, alone and together: half a minute to three minutes on an idle machine for 66 runs of strain. Step 2 can be used meanwhile.") : null,
     !running.length && broken ? [h("p", { class: "bad" }, `${broken.title}: ${broken.state}. ${broken.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: broken.job }) }, "Run again")), ways(c, model)] : null);
 }
 

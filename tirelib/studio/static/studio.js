@@ -1,5 +1,5 @@
 // The frame: steps, campaign, quantity, jobs; the view of the step that the address names.
-import { active, app, connect, current, labelOf, listen, nameOf, progressOf, refresh, wish } from "./data.js";
+import { active, app, connect, current, inView, labelOf, listen, nameOf, progressOf, refresh, tell, timeOf, wish } from "./data.js";
 import { h, fill, toast } from "./dom.js";
 import { entries, Open, receive } from "./open.js";
 import { See } from "./see.js";
@@ -31,7 +31,7 @@ function route() {
 }
 
 function draw() {
-  const c = app.campaign, model = current();
+  const c = app.campaign, model = inView();
   fill(document.getElementById("steps"), Object.entries(VIEWS).map(([name, [, title]], i) => h("a", {
     href: `#/${name}/${app.wanted || ""}`, "aria-current": name === step ? "step" : null,
     "aria-disabled": name !== "open" && !c ? "true" : null,
@@ -56,9 +56,9 @@ function jobs() {
       h("button", { class: "small", type: "button", onclick: () => wish({ do: "cancel", job: job.job }) }, "Cancel"))));
   }
   for (const box of place.children) {
-    const at = progressOf(Number(box.dataset.job)), bar = box.querySelector("progress");
+    const number = Number(box.dataset.job), at = progressOf(number), bar = box.querySelector("progress");
     if (at?.total) { bar.max = at.total; bar.value = Math.min(at.done, at.total); } else bar.removeAttribute("value");
-    box.querySelector("[data-label]").textContent = at ? labelOf(at) || (at.done ? `step ${at.done}` : "begins") : "waits";
+    box.querySelector("[data-label]").textContent = at ? [labelOf(at) || (at.done ? `step ${at.done}` : "begins"), timeOf(shown.find((job) => job.job === number))].filter(Boolean).join("; ") : "waits";
   }
 }
 
@@ -97,6 +97,7 @@ onDrag("drop", async (event) => {
 let first = true;
 const begun = Date.now() / 1000, told = new Set(); // what had failed before is no news
 listen((what) => {
+  if (what === "link") document.body.classList.toggle("lost", !app.connected); // it is seen wherever the page has been scrolled
   if (what === "link") document.getElementById("link").textContent = app.connected ? "connected" : "The server does not answer; nothing is lost. Start tirelib studio again.";
   if (what === "progress") { jobs(); view?.progress?.(); }
   if (what !== "state") return;
@@ -116,6 +117,7 @@ listen((what) => {
   }
   draw();
 });
+setInterval(() => { if (app.running.length) tell("progress"); }, 1000); // the time goes on between the steps of a job
 window.addEventListener("hashchange", route);
 connect();
 route();

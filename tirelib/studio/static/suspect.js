@@ -1,5 +1,5 @@
 // Step 3: which effect is missing: the verdict in four lines, the effects by part, the trace of each.
-import { app, arraysOf, current, documentOf, failedOf, VERDICTS, wish } from "./data.js";
+import { app, arraysOf, current, documentOf, failedOf, verdictOf, wish } from "./data.js";
 import { fill, h, number, strength, toast, unitName } from "./dom.js";
 import { effectPage } from "./effect.js";
 import { Plot } from "./plots.js";
@@ -77,7 +77,7 @@ export class Suspect {
   say() {
     const { told, model } = this;
     const apart = told.verdict === "indistinguishable" || told.candidates.some((e) => e.twins.length && told.named.includes(e.effect)) || (told.sets || []).length > 1;
-    fill(this.head, h("div", { class: "row" }, h("h2", {}, "The verdict"), h("span", { class: "tag alarm", id: "verdict" }, VERDICTS[told.verdict] || told.verdict),
+    fill(this.head, h("div", { class: "row" }, h("h2", {}, "The verdict"), h("span", { class: "tag alarm", id: "verdict" }, verdictOf(told.verdict, told.error_unit)),
       told.false_alarm !== undefined && told.false_alarm !== null ? h("span", { class: "quiet small" }, `chance of a false alarm: ${number(100 * told.false_alarm, 2)} %`) : null, h("span", { class: "room" }),
       told.named.length && told.verdict !== "indistinguishable" ? h("button", { type: "button", id: "tick-named", onclick: () => { for (const box of this.list.querySelectorAll("input[data-effect]")) if (told.named.includes(box.dataset.effect) && !box.checked) box.click(); this.button.focus(); } }, told.named.length > 1 && told.verdict !== "indistinguishable" ? "Tick what is named" : "Tick it") : null,
       h("button", { type: "button", onclick: () => wish({ do: "next-test", ...this.where() }).then(() => toast("The next run is being looked for.")) }, apart ? "What would tell them apart?" : "Which run to measure next?")),
@@ -96,7 +96,7 @@ export class Suspect {
     const order = [...data.run.keys()].sort((a, b) => data[x][a] - data[x][b]);
     const all = [...order.map((i) => [data[x][i], data[y][i], null]), ...list.map((run) => [at(run, x), null, at(run, y)])].filter(([v]) => v !== null).sort((a, b) => a[0] - b[0]);
     queueMicrotask(() => draw.show({ title: "the plan, and the runs that would tell most", unit: unitOfCondition(y), y: label(y), x: { title: label(x), values: all.map((a) => a[0]) }, series: [{ name: "measured runs", values: all.map((a) => a[1]), color: "measured", points: true }, { name: "best next runs", values: all.map((a) => a[2]), color: "rest", points: true, hollow: true }] }));
-    fill(plan, h("h3", {}, "The next run"), h("p", {}, said), list.map((run) => h("p", {}, ["load_N", "pressure_bar", "speed_kmh", "slip_angle_deg", "camber_deg", "slip_ratio"].filter((k) => run[k] !== undefined && run[k] !== null).map((k) => `${k.replace("_N", " [N]").replace("_bar", " [bar]").replace("_kmh", " [km/h]").replace("_deg", " [deg]").replaceAll("_", " ")} ${number(run[k])}`).join(", "))), list.length ? draw.element : null);
+    fill(plan, h("h3", {}, "The next run"), h("p", {}, said.charAt(0).toUpperCase() + said.slice(1)), list.map((run) => h("p", {}, ["load_N", "pressure_bar", "speed_kmh", "slip_angle_deg", "camber_deg", "slip_ratio"].filter((k) => run[k] !== undefined && run[k] !== null).map((k) => `${k.replace("_N", " [N]").replace("_bar", " [bar]").replace("_kmh", " [km/h]").replace("_deg", " [deg]").replaceAll("_", " ")} ${number(run[k])}`).join(", "))), list.length ? draw.element : null);
     return plan;
   }
 
