@@ -115,12 +115,12 @@ def test_what_was_measured_is_seen_before_any_model_is_fitted(browser: Any, tmp_
 def test_a_failed_import_leaves_the_list_after_a_good_one(browser: Any, tmp_path: Path) -> None:
     with closing(Served(tmp_path)) as served:
         until(lambda: served.server.started)
-        files = served.upload("few.csv", b"a\n1\n")[1]["files"]
-        served.do(do="dropped", files=files)
         page = page_at(browser, f"http://{served.host}/?token={TOKEN}")
         said = page.locator("#main").get_by_text("make a campaign from the files: failed.")
         counts = []
         for name in ("bad", "good", "bad"):
+            files = served.upload("few.csv", b"a\n1\n")[1]["files"]
+            served.do(do="dropped", files=files)
             job = served.do(do="import", files=files, map={"name": name})[1]["job"]
             over = f"studio.home?.jobs.some(one => one.job === {job} && one.ended)"
             wait_for(page, f"!!({over}) && document.getElementById('main').innerText.length > 0")
