@@ -21,7 +21,7 @@ from tirelib.cli import program
 from tirelib.cli.fleet import run_verb
 from tirelib.errors import FormatError, ParameterError
 from tirelib.fleet import engine, work
-from tirelib.fleet.dataset import DataSet
+from tirelib.fleet.dataset import DataSet, now
 from tirelib.fleet.engine import Counts
 from tirelib.fleet.page import fleet_document, write_fleet_page
 from tirelib.fleet.sources import Source, content_hash, find_sources
@@ -147,6 +147,17 @@ def test_a_copy_is_computed_once_and_named_beside_the_other(
     assert places[one][0] in Path(write_fleet_page(DataSet(str(out)))).read_text()
 
 
+def test_a_recording_is_refused_as_one_where_only_campaigns_serve(
+    client: Client, tmp_path: Path
+) -> None:
+    drive = describe(tmp_path / "in" / "drive")
+    write_drive(drive / "a.mf4", seconds=1.0)
+    for task in ("check", "features"):
+        counts = run(task, [drive], tmp_path / "out", client)
+        (said,) = counts.messages.values()
+        assert f"a recording is given; {task} takes campaigns" in said
+
+
 def test_a_worker_that_has_not_the_folders_says_so(campaigns: Path, tmp_path: Path) -> None:
     data = DataSet(str(tmp_path / "out"))
     data.open()
@@ -174,6 +185,14 @@ def test_a_header_that_is_broken_is_the_cause_and_not_the_tire_that_it_hides(
 ) -> None:
     calibrations = DataSet(str(tmp_path / "calibrations"))
     calibrations.open()
+    row = {
+        "container_id": 1,
+        "tire": "mine",
+        "content_hash": "f",
+        "file": "f",
+        "finished_dt": now(),
+    }
+    calibrations.add("calibrate", {"container_metrics": [row]})
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "campaign.toml").write_text("[tire\n")
     counts = run("estimate", [tmp_path], tmp_path / "out", client, calibration=calibrations.url)
@@ -220,6 +239,29 @@ def test_calibrations_of_a_data_set_serve_every_campaign_of_their_tire(
     assert run("calibrate", [whole], calibrations, client, also=("--quick",)).done == 1
     counts = run("estimate", [campaigns / "north"], out, client, calibration=calibrations)
     assert (counts.done, counts.failed) == (3, 0)
+
+
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        ('{"format": "tirelib-fleet/1"}', "without any calibration; run `tirelib fleet calibrate"),
+        ('{"format": "tirelib-fleet/2"}', "this version reads 'tirelib-fleet/1'"),
+        ('{"form', "fleet.json is damaged"),
+        ("[]", "fleet.json is damaged"),
+    ],
+)
+def test_a_data_set_that_cannot_serve_is_refused_before_any_work(
+    head: str, said: str, tmp_path: Path
+) -> None:
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "fleet.json").write_text(head)
+    data = DataSet(str(tmp_path / "out"))
+    data.open()
+    with pytest.raises(FormatError, match=said):
+        engine.recipe_of("estimate", data, files={"calibration": str(tmp_path / "other")})
+    if "/1" not in head:
+        with pytest.raises(FormatError, match=said):
+            DataSet(str(tmp_path / "other")).open()
 
 
 @pytest.mark.parametrize(

@@ -84,12 +84,7 @@ class DataSet:
         """
         try:
             if self.fs.exists(self.path(HEAD)):
-                given = json.loads(self.fs.cat_file(self.path(HEAD))).get("format")
-                if given != FORMAT:
-                    raise FormatError(
-                        f"{self.url}: a data set of format {given!r}; this version reads "
-                        f"{FORMAT!r}; choose another --out"
-                    )
+                self.check_version()
                 return
             if self.fs.exists(self.root) and self.fs.ls(self.root):
                 raise FormatError(
@@ -103,6 +98,28 @@ class DataSet:
             raise FormatError(
                 f"{self.url}: cannot be written ({error}); choose another --out, or check its keys"
             ) from None
+
+    def check_version(self) -> None:
+        """Refuse a data set of another version, or one whose head is damaged.
+
+        Raises
+        ------
+        FormatError
+            If it is one.
+        """
+        head = self.read(HEAD)
+        try:
+            given = json.loads(head)["format"]
+        except (ValueError, KeyError, TypeError):
+            raise FormatError(
+                f"{self.url}: {HEAD} is damaged ({head[:40]!r}); it must hold "
+                f"{json.dumps({'format': FORMAT})}; write that into it, or choose another data set"
+            ) from None
+        if given != FORMAT:
+            raise FormatError(
+                f"{self.url}: a data set of format {given!r}; this version reads {FORMAT!r}; "
+                "choose another data set"
+            )
 
     def write(self, content: bytes, *parts: str) -> None:
         """Write a file whole or not at all."""

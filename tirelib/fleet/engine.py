@@ -127,6 +127,7 @@ def _taken(data: DataSet, name: str, given: str) -> tuple[str, str]:
             raise FormatError(
                 f"--{name} {given}: neither a file nor a data set of `tirelib fleet`; correct it"
             )
+        other.check_version()
         content, ending = _index(other, name), "index.json"
     digest = sha256(content).hexdigest()
     place = f"recipes/{digest[:16]}/{ending}"
@@ -150,6 +151,11 @@ def _index(other: DataSet, name: str) -> bytes:
     columns = ["content_hash", "tire", "file", "finished_dt"]
     rows = other.table("container_metrics", columns, pads.field(PARTITION) == task)
     found = sorted(rows.to_pylist(), key=lambda row: row["finished_dt"])
+    if not found:
+        raise FormatError(
+            f"--{name} {other.url}: a data set without any {name}; run `tirelib fleet {task} "
+            f"PATHS... --out {other.url}` first"
+        )
     return json.dumps(
         {
             "data_set": other.url,

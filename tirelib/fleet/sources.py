@@ -43,6 +43,9 @@ def find_sources(paths: Sequence[str]) -> list[Source]:
     for path in paths:
         try:
             below = list(_below(path))
+        except FileNotFoundError as error:
+            problems.append(f"{path}: {error}; a folder, a pattern or a URL is needed; correct it")
+            continue
         except Exception as error:  # each kind of storage has errors of its own
             problems.append(f"{path}: cannot be reached ({error}); check the address and its keys")
             continue
@@ -64,7 +67,8 @@ def _below(path: str) -> Iterator[Source]:
     for each in roots:
         if not fs.isdir(each):
             if each == root:
-                raise FileNotFoundError(f"{each} is no folder")
+                kind = "a file and no folder" if fs.exists(each) else "no such folder"
+                raise FileNotFoundError(kind)
             continue
         for folder, below, files in fs.walk(each):
             if CAMPAIGN in files or RECORDING in files:

@@ -239,6 +239,11 @@ def _compute(job: _Job, folder: Path, aside: Path, verb: Verb) -> Outcome:
     began = time.perf_counter()
     recipe, data, names = job.recipe, job.data, _Names(job.recipe.task, job.container)
     about = _about(folder)
+    if about.kind == "recording" and recipe.task != "estimate":
+        raise FormatError(
+            f"{job.source.url}: a recording is given; {recipe.task} takes campaigns, and estimate "
+            "takes both; leave it out of PATHS"
+        )
     answer = aside / "answer.json"
     turns = aside / "turns.parquet"
     made = aside / "made.toml"
