@@ -1,5 +1,6 @@
 """A fleet on a cluster: what is kept, skipped, reported, resumed, and who can read it."""
 
+import errno
 import json
 import shutil
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 from fsspec import AbstractFileSystem
+from fsspec.implementations.local import LocalFileSystem
 
 pytest.importorskip("distributed", reason="the extra tirelib[fleet] is not installed")
 
@@ -20,7 +22,7 @@ from tests.fleet.recordings import describe, write_drive
 from tirelib.cli import program
 from tirelib.cli.fleet import run_verb
 from tirelib.errors import FormatError, ParameterError
-from tirelib.fleet import engine, work
+from tirelib.fleet import dataset, engine, work
 from tirelib.fleet.dataset import DataSet, now
 from tirelib.fleet.engine import Counts
 from tirelib.fleet.page import fleet_document, write_fleet_page
@@ -127,6 +129,22 @@ def test_finished_ones_are_skipped_wherever_they_lie(
         moved.rename(campaigns / "north" / "day-2")
     assert (counts.total, counts.known, counts.done) == (1, 1, 0)
     assert len(pd.read_parquet(out / "container_metrics")) == 4
+
+
+def test_a_folder_that_cannot_be_searched_is_named(
+    campaigns: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def listed(self: LocalFileSystem, path: str, **more: object) -> object:
+        if path.endswith("broken"):
+            raise PermissionError(errno.EACCES, "Permission denied", path)
+        return real(self, path, **more)
+
+    real = LocalFileSystem.ls
+    monkeypatch.setattr(LocalFileSystem, "ls", listed)
+    said: list[Exception] = []
+    assert len(find_sources([str(campaigns)], said.append)) == 3
+    (error,) = said
+    assert str(campaigns / "broken") in str(error)
 
 
 def test_a_copy_is_computed_once_and_named_beside_the_other(
@@ -289,6 +307,23 @@ def test_paths_without_campaigns_and_foreign_folders_are_refused(tmp_path: Path)
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(FormatError, match="not empty and not a data set"):
         DataSet(str(tmp_path)).open()
+
+
+def test_a_full_disk_is_said_with_the_file_and_the_same_command_goes_on(
+    campaigns: Path, client: Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+
+    def full(table: object, where: object, **more: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(dataset.pq, "write_table", full)
+        with pytest.raises(FormatError, match=rf"{out}/.*cannot be written \(No space left"):
+            run("check", [campaigns / "north"], out, client)
+    assert not list(out.rglob("*.part"))
+    monkeypatch.setattr(work, "_compute", lambda *given: pytest.fail("computed again"))
+    assert run("check", [campaigns / "north"], out, client).done == 3
 
 
 class Locked(AbstractFileSystem):  # type: ignore[misc]

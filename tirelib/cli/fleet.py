@@ -133,7 +133,9 @@ def fleet(
     from tirelib.fleet.sources import find_sources
 
     options = _options(task, more)
-    sources = find_sources(paths)
+    sources = find_sources(
+        paths, lambda error: click.echo(f"Warning: {error}; the folder is left out", err=True)
+    )
     data = DataSet(str(out))
     data.open()
     files = {"calibration": calibration, "model": model}

@@ -128,15 +128,26 @@ class DataSet:
 
     @contextmanager
     def writing(self, *parts: str) -> Iterator[Path]:
-        """Yield a file of this machine that becomes the data set's at the end, whole or not."""
+        """Yield a file of this machine that becomes the data set's at the end, whole or not.
+
+        Raises
+        ------
+        FormatError
+            If it cannot be written, for instance because the disk is full.
+        """
         target = self.path(*parts)
         if self.local:
             place = Path(target)
-            place.parent.mkdir(parents=True, exist_ok=True)
             aside = place.with_name(f".{uuid4().hex}.part")
             try:
+                place.parent.mkdir(parents=True, exist_ok=True)
                 yield aside
                 aside.replace(place)
+            except OSError as error:
+                raise FormatError(
+                    f"{target}: cannot be written ({error.strerror or error}); make room or give "
+                    "the right to write, and give the same command again"
+                ) from None
             finally:
                 aside.unlink(missing_ok=True)
             return

@@ -1,7 +1,7 @@
 """What there is to do: campaigns and recordings below folders, globs and URLs."""
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,9 @@ class Source:
     local: bool
 
 
-def find_sources(paths: Sequence[str]) -> list[Source]:
+def find_sources(
+    paths: Sequence[str], left_out: Callable[[Exception], None] = lambda error: None
+) -> list[Source]:
     """Return every campaign and recording below the paths, each once, in the order of addresses.
 
     Parameters
@@ -32,6 +34,8 @@ def find_sources(paths: Sequence[str]) -> list[Source]:
     paths : sequence of str
         Folders, patterns with ``*``, or URLs that fsspec knows (``s3://bucket/campaigns``). A
         folder that is neither a campaign nor a recording is searched through.
+    left_out : callable
+        Called with the error of each folder that cannot be searched.
 
     Raises
     ------
@@ -42,7 +46,7 @@ def find_sources(paths: Sequence[str]) -> list[Source]:
     problems = []
     for path in paths:
         try:
-            below = list(_below(path))
+            below = list(_below(path, left_out))
         except FileNotFoundError as error:
             problems.append(f"{path}: {error}; a folder, a pattern or a URL is needed; correct it")
             continue
@@ -60,7 +64,7 @@ def find_sources(paths: Sequence[str]) -> list[Source]:
     return [found[url] for url in sorted(found)]
 
 
-def _below(path: str) -> Iterator[Source]:
+def _below(path: str, left_out: Callable[[Exception], None]) -> Iterator[Source]:
     fs, root = url_to_fs(path, use_listings_cache=False)
     local = "file" in _protocols(fs)
     roots = sorted(fs.glob(root)) if any(sign in root for sign in "*?[") else [root]
@@ -70,7 +74,7 @@ def _below(path: str) -> Iterator[Source]:
                 kind = "a file and no folder" if fs.exists(each) else "no such folder"
                 raise FileNotFoundError(kind)
             continue
-        for folder, below, files in fs.walk(each):
+        for folder, below, files in fs.walk(each, on_error=left_out):
             if CAMPAIGN in files or RECORDING in files:
                 below.clear()
                 yield Source(folder if local else fs.unstrip_protocol(folder), local)
