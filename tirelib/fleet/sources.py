@@ -74,10 +74,18 @@ def _below(path: str, left_out: Callable[[Exception], None]) -> Iterator[Source]
                 kind = "a file and no folder" if fs.exists(each) else "no such folder"
                 raise FileNotFoundError(kind)
             continue
-        for folder, below, files in fs.walk(each, on_error=left_out):
-            if CAMPAIGN in files or RECORDING in files:
-                below.clear()
-                yield Source(folder if local else fs.unstrip_protocol(folder), local)
+        for folder in _holding(fs, each, left_out):
+            yield Source(folder if local else fs.unstrip_protocol(folder), local)
+
+
+def _holding(fs: Any, folder: str, left_out: Callable[[Exception], None]) -> Iterator[str]:
+    """Yield the folders of campaigns and recordings; `walk` hands its `on_error` no level down."""
+    for _, below, files in fs.walk(folder, maxdepth=1, on_error=left_out):
+        if CAMPAIGN in files or RECORDING in files:
+            yield folder
+        else:
+            for name in below:
+                yield from _holding(fs, f"{folder.rstrip('/')}/{name}", left_out)
 
 
 def _protocols(fs: Any) -> tuple[str, ...]:
