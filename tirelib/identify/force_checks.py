@@ -24,13 +24,13 @@ def slips_vary(data: ForceData) -> tuple[bool, bool]:
     """
     angles, ratios = np.ptp(data.slip_angle), np.ptp(data.slip_ratio)
     if angles < ANGLE_SPAN and ratios < RATIO_SPAN:
-        usual = np.rad2deg(round(float(np.median(data.slip_angle)), 4)) + 0.0
+        only = round(float(np.median(data.slip_angle)), 4)
         raise CalibrationError(
-            f"brush fit: slip angles span {np.rad2deg(angles):.2g} deg and slip ratios "
-            f"{ratios:.2g}, at {len(data)} points (about {usual:.2f} deg and "
-            f"{np.median(data.slip_ratio):.3f}); a span of "
-            f"{np.rad2deg(ANGLE_SPAN):g} deg or {RATIO_SPAN:g} is needed; add runs with other slip "
-            "angles or slip ratios, or correct the unit of the slip"
+            f"brush fit: the only slip angle is {np.rad2deg(only) + 0.0:.2f} deg "
+            f"and the only slip ratio {np.median(data.slip_ratio):.3f}: slip angles span "
+            f"{np.rad2deg(angles):.2g} deg and slip ratios {ratios:.2g} over {len(data)} points; "
+            f"at least {np.rad2deg(ANGLE_SPAN):g} deg or {RATIO_SPAN:g} is needed; add runs with "
+            "other slip angles or slip ratios, or correct the unit of the slip"
         )
     return bool(angles >= ANGLE_SPAN), bool(ratios >= RATIO_SPAN)
 

@@ -263,12 +263,15 @@ class Null:
         return after - before
 
     def angle(self, one: str, other: str) -> float:
-        """Return the smallest angle between two effects' signatures as this test weighs them."""
+        """Return the smallest angle between two effects' signatures as this test weighs them.
+
+        It is a right angle where one of them does nothing to the fitted model.
+        """
         a, b = (self.blocks[self.names.index(name)] for name in (one, other))
         gram = self.likeliest.gram
-        left, right = (np.linalg.cholesky(gram[k, k]) for k in (a, b))
-        inner = np.linalg.solve(left, np.linalg.solve(right, gram[b, a]).T)
-        return float(np.arccos(min(float(np.linalg.norm(inner, 2)), 1.0)))
+        inner = _orthonormal(gram[a, a]).T @ gram[a, b] @ _orthonormal(gram[b, b])
+        cosine = float(np.linalg.norm(inner, 2)) if inner.size else 0.0
+        return float(np.arccos(min(cosine, 1.0)))
 
     def power(self, name: str, strength: float, limit: float) -> float:
         """Return the chance that an effect of so many ranges has a score beyond a limit."""
@@ -285,6 +288,13 @@ def standard(ratio: FloatArray, count: FloatArray) -> FloatArray:
     """Return the normal score of a mean square of `count` numbers over its expectation."""
     spread = 2.0 / (9.0 * count)
     return np.asarray((np.cbrt(np.maximum(ratio, 0.0)) - (1.0 - spread)) / np.sqrt(spread))
+
+
+def _orthonormal(gram: FloatArray) -> FloatArray:
+    """Return coefficients (n, rank) of rows with these products that make them orthonormal."""
+    values, vectors = np.linalg.eigh(gram)
+    kept = values > len(values) * np.finfo(float).eps * values[-1]
+    return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
 
 
 def _sizes(largest: float, blocks: Iterable[str]) -> list[Size]:

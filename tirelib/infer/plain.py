@@ -83,13 +83,14 @@ class Family:
         Parameters
         ----------
         sizes : mapping of block to float
-            Mean square of its rows in this plan.
+            Mean square of its rows in this plan; zero where they do nothing, and nothing is added.
         """
         shown = self.shown()
         if self.least:
             return shown
         mean = float(np.mean([shown[k] * size for k, size in sizes.items() if k in shown]))
-        return {k: max(shown.get(k, 0.0), EVEN**2 * mean / size) for k, size in sizes.items()}
+        least = {k: EVEN**2 * mean / size if size else 0.0 for k, size in sizes.items()}
+        return {k: max(shown.get(k, 0.0), least[k]) for k in sizes}
 
     def on(self, blocks: Mapping[str, slice], count: int) -> FloatArray:
         """Return the tires' coefficients for the rows of a user's plan, (n_tires, count).

@@ -202,7 +202,7 @@ class Hypotheses:
         shared = [*self.had, *self.effects.values(), *self.families]
         part, starts = problem.thinned(), list(problem.starts)
         if part is not problem or len(starts) > 1:
-            calls = [partial(self._roughly, part, k) for k in range(len(starts))]
+            calls = [partial(self._roughly, part, start) for start in starts]
             starts = _apart(part, starts, forked(calls, shared))
         found = forked([partial(self._from, problem, start) for start in starts], shared)
         settled = [each for each in found if not isinstance(each, TirelibError)]
@@ -213,10 +213,10 @@ class Hypotheses:
             problem = problem.about(solved)
         return problem, base
 
-    def _roughly(self, part: Problem, k: int) -> Posterior | None:
-        """Return a rough fit of a part of the measurement from one start; None if none settles."""
+    def _roughly(self, part: Problem, start: Point) -> Posterior | None:
+        """Return a rough fit of a part of the measurement from a start; None if it diverges."""
         try:
-            return self._fit(part, start=part.starts[k], settled=ROUGH)
+            return self._fit(part, start=start, settled=ROUGH)
         except TirelibError:
             return None
 

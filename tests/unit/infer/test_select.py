@@ -57,6 +57,14 @@ def test_what_is_hidden_is_named_with_its_strength(name: str) -> None:
     assert right >= 10  # 11 expected: a true hypothesis is rejected with at most 5 %
 
 
+def test_what_does_nothing_to_the_model_is_at_a_right_angle_to_all() -> None:
+    toy = Toy(drawn(np.random.default_rng(9)), alike=True)
+    toy.by["swell"] = np.zeros((1, N))
+    null = Hypotheses(toy, FAMILIES).base.null
+    assert null.angle("swell", "twist") == null.angle("twist", "swell") == np.pi / 2.0
+    assert null.angle("bend", "twist") < 1e-3
+
+
 def test_two_are_found_together() -> None:
     found = select(Toy(drawn(np.random.default_rng(2), bend=0.6, twist=0.6)), FAMILIES)
     assert {frozenset(names) for names in found.sets} == {frozenset(("bend", "twist"))}
