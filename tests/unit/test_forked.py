@@ -1,6 +1,7 @@
 """Calls in this process and in a copy of it: the same results with one processor and two."""
 
 import os
+import select
 from collections.abc import Callable
 from functools import partial
 
@@ -24,9 +25,25 @@ def test_results_come_in_the_order_of_the_calls(processors: int) -> None:
     np.testing.assert_array_equal(found, np.arange(COUNT)[:, None] * np.ones(3))
 
 
-def test_every_other_call_is_computed_by_a_copy(processors: int) -> None:
-    found = {pid == os.getpid() for pid in forked([os.getpid] * COUNT)[1::2]}
-    assert found == {processors == 1}
+def test_a_long_call_does_not_keep_the_others_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tirelib.forked._processors", lambda: 2)
+    back, out = os.pipe()
+
+    def first() -> int:
+        assert select.select([back], [], [], 30.0)[0], "the others wait for this call"
+        return os.getpid()
+
+    def last() -> int:
+        os.write(out, b".")
+        return os.getpid()
+
+    try:
+        found = forked([first, os.getpid, last])
+    finally:
+        os.close(back)
+        os.close(out)
+    assert found[1] == found[2] != found[0]
+    assert os.getpid() in found
 
 
 def test_what_both_have_comes_back_as_the_same_object(processors: int) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.compare.error import ModelError, named_errors
+from tirelib.compare.error import NOISE, ModelError, named_errors
 from tirelib.compare.model import Model
 from tirelib.diagnose.diagnose import Diagnosis, Finding
 from tirelib.diagnose.fitted import Fitted
@@ -62,18 +62,17 @@ def assess(found: Diagnosis, given: Model) -> Assessment:
     """
     models = found.models
     verdict, named, findings, messages = found.verdict.kind, found.named, found.findings, []
-    before, refitted = models.least_error(found.base, given)
-    if not refitted.known:
+    if models.yardstick.unit != NOISE:
         verdict, named = "none", ()
         findings = tuple(_hint(finding) for finding in findings)
         messages.append(NO_REPEATS)
     final = found.final if named else found.base
-    after = final.reached if named else refitted
-    floor = floor_of(after, found.verdict.best, found.verdict.alpha)
     chosen = models.folds if named else ()
     singles = {name: one for name in named if (one := _with_one(found, name)) is not None}
-    if chosen:
-        models.left_out(found.base, *singles.values(), final)
+    models.find(found.base, given, held=(found.base, *singles.values(), final) if chosen else ())
+    before, refitted = models.least_error(found.base, given)
+    after = final.reached if named else refitted
+    floor = floor_of(after, found.verdict.best, found.verdict.alpha)
     if named and not chosen:
         messages.append(
             "nothing can be held out: three loads or two pressures, and four other runs, are needed"

@@ -62,10 +62,8 @@ def folds(data: Data) -> tuple[Fold, ...]:
     return tuple(found)
 
 
-def held_out(
-    model: Fitted, chosen: Sequence[Fold], yardstick: Yardstick
-) -> tuple[ModelError | None, ...]:
-    """Return a model's error on each fold's runs after a fit to the other runs, with its residual.
+def held_out(model: Fitted, fold: Fold, yardstick: Yardstick) -> ModelError | None:
+    """Return a model's error on a fold's runs after a fit to the other runs, with its residual.
 
     None where the fit does not settle or the model fails there.
 
@@ -73,19 +71,16 @@ def held_out(
     ----------
     model : Fitted
         Its effects stay.
-    chosen : sequence of Fold
+    fold : Fold
     yardstick : Yardstick
         Of the campaign: the unit is that of every other error of it.
     """
-    errors: list[ModelError | None] = []
-    for fold in chosen:
-        try:
-            trained, delay = model.without_runs(fold.out)
-            start = model.rolling.take(fold.out)
-            errors.append(yardstick.take(fold.out).error(trained, delay, start=start))
-        except TirelibError:
-            errors.append(None)
-    return tuple(errors)
+    try:
+        trained, delay = model.without_runs(fold.out)
+        start = model.rolling.take(fold.out)
+        return yardstick.take(fold.out).error(trained, delay, start=start)
+    except TirelibError:
+        return None
 
 
 def values_of_errors(errors: Sequence[ModelError | None]) -> tuple[float, ...]:

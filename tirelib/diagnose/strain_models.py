@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -99,18 +100,37 @@ class StrainModels:
         given : Model, optional
             The model of the fit as its file has it; as it was fitted by default.
         """
-        if fit not in self._least:
-            self._least[fit] = least_error(fit, given or fit.model, self.yardstick)
+        self.find(fit, given)
         return self._least[fit]
 
     def left_out(self, *fits: Fitted) -> list[tuple[ModelError | None, ...]]:
         """Return the errors of models on each fold's runs, as `held_out`."""
-        new = [fit for fit in dict.fromkeys(fits) if fit not in self._held]
-        if new and self.folds and self.progress is not None:
-            self.progress("fits without some of the runs")
-        found = forked([partial(held_out, fit, self.folds, self.yardstick) for fit in new])
-        self._held |= dict(zip(new, found, strict=True))
+        self.find(held=fits)
         return [self._held[fit] for fit in fits]
+
+    def find(
+        self, fit: Fitted | None = None, given: Model | None = None, held: Sequence[Fitted] = ()
+    ) -> None:
+        """Find the least error of a model, and errors of models on each fold's runs, all at once.
+
+        The arguments are those of `least_error` and `left_out`, which only look up what is found.
+        """
+        calls: list[Callable[[], Any]] = []
+        if fit is not None and fit not in self._least:
+            calls.append(partial(least_error, fit, given or fit.model, self.yardstick))
+        ahead = len(calls)
+        new = [each for each in dict.fromkeys(held) if each not in self._held]
+        calls += [
+            partial(held_out, each, fold, self.yardstick) for each in new for fold in self.folds
+        ]
+        if len(calls) > ahead and self.progress is not None:
+            self.progress("fits without some of the runs")
+        found = forked(calls)
+        if fit is not None and ahead:
+            self._least[fit] = found[0]
+        for k, each in enumerate(new):
+            first = ahead + k * len(self.folds)
+            self._held[each] = tuple(found[first : first + len(self.folds)])
 
     def held_out(self, fit: Fitted) -> tuple[float, ...]:
         """Return the errors of a model on each fold's runs; NaN where there is none."""

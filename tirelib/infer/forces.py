@@ -161,6 +161,9 @@ class ForceProblem:
         """Return the problem itself: a fit to forces costs little."""
         return self
 
+    def forget(self) -> None:
+        """Do nothing: no slopes are kept."""
+
     def about(self, solved: ForceSolved) -> "ForceProblem":
         """Return the problem: its whitening stays about the given model."""
         return self

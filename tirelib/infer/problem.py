@@ -101,6 +101,9 @@ class Problem(Protocol):
         It has the same coordinates and effects.
         """
 
+    def forget(self) -> None:
+        """Forget what only saves time, so that a fit does not depend on those before it."""
+
     def solve(self, point: Point, near: Any = None) -> Solved:
         """Return the model at a point; raises TirelibError where it has none."""
 

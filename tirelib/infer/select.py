@@ -165,6 +165,7 @@ class Hypotheses:
     def _alone(self, names: Sequence[str], near: Hypothesis) -> Hypothesis | None:
         """Return a hypothesis from a fit nearby; None where no fit settles."""
         more = [self.effects[name] for name in names]
+        self.problem.forget()
         try:
             effects = [*self.had, *more]
             fit = posterior(self.problem, effects, self.spread, self.own, near=near.fit)
@@ -215,6 +216,7 @@ class Hypotheses:
 
     def _roughly(self, part: Problem, start: Point) -> Posterior | None:
         """Return a rough fit of a part of the measurement from a start; None if it diverges."""
+        part.forget()
         try:
             return self._fit(part, start=start, settled=ROUGH)
         except TirelibError:
@@ -223,6 +225,7 @@ class Hypotheses:
     def _from(self, problem: Problem, start: Point) -> tuple[list[Any], Hypothesis] | TirelibError:
         """Return the fit from a start, and the solutions that its whitening was about in turn."""
         passed: list[Any] = []
+        problem.forget()
         try:
             fit = self._fit(problem, start=start, settled=ROUGH)
             for _ in range(ROUNDS):

@@ -351,7 +351,7 @@ class StrainProblem:
         return own * float(np.sqrt(np.mean(self.reference.waveform**2)))
 
     def forget(self) -> None:
-        """Forget slopes that only save time."""
+        """Forget slopes that only save time, so that a fit does not depend on those before it."""
         self._last = self._added = self._strengths = None
 
     def solve(self, point: Point, near: StrainSolved | None = None) -> StrainSolved:
