@@ -14,6 +14,8 @@ from pathlib import Path
 PATIENCE = 600.0
 """No machine is so busy that something takes longer than this, [s]: what does, hangs."""
 LOOK = 0.02
+EMPTY = 25
+"""Looks at a port in a row that find nothing before it is drained: half a second."""
 A_TURN = r"\n +\d+ +\d+ +[\d.]+ "
 """A line that `tirebench run` prints of a turn: wheel, run, time."""
 
@@ -84,12 +86,21 @@ class Line:
         run.says("samples a step")
         self._go.touch()
         self.wheel.says("played")
-        wait_until(lambda: not unread(self.port), f"the run to read all of {self.port}")
+        wait_until(lambda: drained(self.port), f"the run to read all of {self.port}")
         run.says(A_TURN)  # from then on it ends in good order
         run.send_signal(signal.SIGINT)
         outcome = run.finish()
         assert self.wheel.finish()[0] == 0
         return outcome
+
+
+def drained(port: str) -> bool:
+    """Return whether nothing more comes out of a port.
+
+    The system hands a reader what was written in parts of 4096 bytes, each by a task of its own: a
+    port that is empty once may hold more.
+    """
+    return not any(unread(port) or time.sleep(LOOK) for _ in range(EMPTY))
 
 
 def unread(port: str) -> int:
