@@ -29,23 +29,22 @@ import psutil
 from distributed import Client
 from rich.console import Console
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from tests.fleet.recordings import describe, write_drive
+from tests.synthetic import cornering_runs, synthetic_run, write
+from tirelib.campaign import read_campaign
+from tirelib.cli.fleet import run_verb
+from tirelib.estimators.calibration_file import write_calibration
+from tirelib.estimators.train import train
+from tirelib.fleet import engine, work
+from tirelib.fleet.cluster import cluster
+from tirelib.fleet.dataset import DataSet
+from tirelib.fleet.sources import Source, find_sources
+from tirelib.observations import observe
+from tirelib.threads import one_thread
+
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
-
-# the tests can be imported only once the checkout is on the path
-from tests.fleet.recordings import describe, write_drive  # noqa: E402
-from tests.synthetic import cornering_runs, synthetic_run, write  # noqa: E402
-from tirelib.campaign import read_campaign  # noqa: E402
-from tirelib.cli.fleet import run_verb  # noqa: E402
-from tirelib.estimators.calibration_file import write_calibration  # noqa: E402
-from tirelib.estimators.train import train  # noqa: E402
-from tirelib.fleet import engine, work  # noqa: E402
-from tirelib.fleet.cluster import cluster  # noqa: E402
-from tirelib.fleet.dataset import DataSet  # noqa: E402
-from tirelib.fleet.sources import Source, find_sources  # noqa: E402
-from tirelib.observations import observe  # noqa: E402
-from tirelib.threads import one_thread  # noqa: E402
-
 SAY = Console(highlight=False, soft_wrap=True).print
 PEAK = """
 import resource, sys

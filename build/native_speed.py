@@ -20,15 +20,15 @@ from pathlib import Path
 import numpy as np
 from fmpy import read_model_description
 
-ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT)]
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
-# the tests can be imported only once the checkout is on the path
-from tests.fmu import live  # noqa: E402
-from tests.synthetic import record  # noqa: E402
-from tirelib.fmu.build import build_fmu  # noqa: E402
-from tirelib.held import HELD  # noqa: E402
-from tirelib.threads import one_thread  # noqa: E402
+from tests.fmu import live
+from tests.synthetic import record
+from tirelib.fmu.build import build_fmu
+from tirelib.held import HELD
+from tirelib.threads import one_thread
+
+ROOT = Path(__file__).parents[1]
 
 RATE = 1e4
 COLUMNS = ("mean", "least", "median", "99 %", "99.9 %", "99.99 %", "99.999 %", "again", "worst")

@@ -125,9 +125,13 @@ class Steps:
 
         self.folder, self.out, self.effect_files = folder, out, effect_files
         self.campaign, self.catalogue = read_campaign(folder), registered_effects(effect_files)
-        self.effects = [word for path in effect_files for word in ("--effects", str(path))]
         self.commands: list[str] = []
         self.messages: list[str] = []
+
+    @property
+    def effects(self) -> list[str]:
+        """The options that name the files of effects."""
+        return [word for path in self.effect_files for word in ("--effects", str(path))]
 
     def walk(self, model_name: str | None, quantity: str | None) -> "Journey":
         """Run the journey and return it.

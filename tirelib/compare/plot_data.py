@@ -112,7 +112,8 @@ def measured_data(campaign: Campaign) -> dict[str, Any]:
 
     Returns
     -------
-    Of strain where the campaign declares gages, else of the first force that was measured.
+    The waveforms of strain where the campaign declares gages, else the first force that was
+    measured.
 
     Raises
     ------

@@ -147,7 +147,8 @@ def as_large(rows: FloatArray, ranges: FloatArray) -> FloatArray:
 def _bent(conditions: FloatArray, present: int) -> FloatArray:
     """Return the squares of conditions (n, n_runs), with the spread that each condition has.
 
-    A law that levels off, where the effect's law goes on, differs by a curvature.
+    A law that levels off, where the effect's law goes on, differs by a curvature. Its size is that
+    of the slopes, `GOES`: raised or halved, it has not been measured by itself.
     """
     here = conditions[:, :present]
     spread = here.std(axis=1, keepdims=True)

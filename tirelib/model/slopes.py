@@ -27,11 +27,16 @@ from tirelib.model.state import READ, Operating, State
 from tirelib.rolling.assemble import Unknowns
 
 SMALL = 1e-4
-"""Change of a waveform, over its largest value, by which a gage is differentiated."""
+"""Change of a waveform, over its largest value, by which a gage is differentiated. On a campaign of
+66 runs half and double of it change slopes by 5e-5 of themselves at most."""
 LINEAR_STEP = 1e-4
-"""Relative change of numbers, load and pressure by which the linear ring is differentiated."""
+"""Relative change of numbers, load and pressure by which the linear ring is differentiated. Half
+and double change slopes by 3e-5 at most, but for the smallest of a tread that slides (by .05 and
+.02): whether a point of the tread slides is no smooth question."""
 DEPTH_STEP = 1e-6
-"""Change of the deflection by which constants that follow it are differentiated, [m]."""
+"""Change of the deflection by which constants that follow it are differentiated, [m]. With a
+sidewall whose stiffness falls with the deflection, half and double change slopes by 7e-4 and 3e-4
+at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +47,7 @@ class SolutionSlopes:
     ----------
     waveform : shape (n_directions, n_points, n_phi)
     rolled : RolledSlopes or None
-        Of the rolling ring, by those directions that move it.
+        Slopes of the rolling ring by those directions that move it.
     """
 
     waveform: FloatArray

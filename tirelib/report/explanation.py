@@ -4,6 +4,7 @@ They are written from the document of a diagnosis (``tirelib-diagnosis/1``) alon
 forces, so that console, page and file say the same.
 """
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -70,8 +71,9 @@ def explained(
     effect_files : sequence of str or Path
         Files with effects of the user's own.
     """
-    data = " ".join([folder, *(f"--effects {file}" for file in effect_files)])
-    return Explanation(_missing(told), _sure(told), error_line(told), _next(told, model, data))
+    files = [word for file in effect_files for word in ("--effects", str(file))]
+    given = ["--model", model, "--data", folder, *files]
+    return Explanation(_missing(told), _sure(told), error_line(told), _next(told, given))
 
 
 def _missing(told: Mapping[str, Any]) -> str:
@@ -321,16 +323,16 @@ def _floor(told: Mapping[str, Any], after: float) -> str:
         if told.get("verdict") in ("unknown", "form_inadequate"):
             return " Noise and the structure of a tire can be as large, but not of this shape."
         return " All of that is noise and the structure of a tire."
-    return f" Of that, noise and the structure of a tire explain {_said(floor)}."
+    return f" Noise and the structure of a tire explain {_said(floor)} of that."
 
 
-def _next(told: Mapping[str, Any], model: str, data: str) -> str:
+def _next(told: Mapping[str, Any], given: Sequence[str]) -> str:
     if told["verdict"] in ("named", "form_inadequate"):
-        option = "" if told["quantity"] == "strain" else f" --quantity {told['quantity']}"
+        option = () if told["quantity"] == "strain" else ("--quantity", told["quantity"])
+        command = ["tirelib", "add", *told["named"], *given, *option, "--out", "M2.toml"]
         return (
-            f"Add {'it' if len(told['named']) == 1 else 'them together'}: "
-            f"tirelib add {' '.join(told['named'])} --model {model} --data {data}{option} "
-            "--out M2.toml; then diagnose again with the new model."
+            f"Add {'it' if len(told['named']) == 1 else 'them together'}: {shlex.join(command)}; "
+            "then diagnose again with the new model."
         )
     what = str(told["next_test"]["what"]).rstrip(".")
     if told["verdict"] == "none" and told["error_unit"] == "noise":

@@ -71,11 +71,13 @@ def test_what_is_named_is_told_with_its_size_its_fall_and_the_command_that_adds_
     )
     assert told.error == (
         "It was 30 times the noise (84.3 microstrain rms), 23.5 with the model's own numbers "
-        "fitted anew, and is 7.7 with it (37.6 microstrain rms). Of that, noise and the structure "
-        "of a tire explain 7.1. On what was held out of the fit it fell as well: 25.9 before, 9.9 "
-        "after."
+        "fitted anew, and is 7.7 with it (37.6 microstrain rms). Noise and the structure of a "
+        "tire explain 7.1 of that. On what was held out of the fit it fell as well: 25.9 before, "
+        "9.9 after."
     )
     assert told.next.startswith("Add it: tirelib add damping --model M.toml --data DIR --out M2")
+    spaced = explained(diagnosis(), "my M.toml", "a b", ["own law.py"])
+    assert "--model 'my M.toml' --data 'a b' --effects 'own law.py' --out M2" in spaced.next
     assert [title for title, _ in told.lines] == [
         "What is missing",
         "How sure",
