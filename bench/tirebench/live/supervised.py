@@ -6,6 +6,7 @@ begun before the process itself, so that it is ready as soon as there is somethi
 """
 
 import gc
+import os
 import signal
 import time
 from collections.abc import Callable
@@ -186,4 +187,8 @@ def settled() -> None:
 def orphaned() -> bool:
     """Whether the run that started this process is gone."""
     parent = parent_process()
-    return parent is not None and not parent.is_alive()
+    if parent is None:
+        return False
+    if os.name == "posix":
+        return os.getppid() != parent.pid  # costs a hundredth of what `is_alive` does
+    return not parent.is_alive()
