@@ -67,7 +67,9 @@ FOLLOWED = 0.003
 that lacks an effect is then as likely from any start: with a stiffness a quarter off, its cost is
 4626, 4623 and 4661; with .01 it is 4626, 4474 and 5026."""
 FEW = 15
-"""Runs with which a fit may begin: the others only make it more accurate."""
+"""Runs with which a fit may begin: the others only make it more accurate. To diagnose two campaigns
+of 66 runs takes 87 and 194 s of CPU with it, 91 and 185 with half, 94 and 143 with double, 110 and
+176 with all of them, on a machine that others used as well; the verdicts are the same."""
 UNKNOWN_NOISE = 0.005
 """Noise over the rms strain where there are no repeats."""
 
