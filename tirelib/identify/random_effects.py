@@ -5,18 +5,13 @@ load, pressure, gain and angle zero, b_ik is normal with the tolerance of the ri
 Its covariance is noise plus rank four, so whitening costs a thin QR a run.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Tolerance
-from tirelib.model.base import predict
-from tirelib.model.state import Operating
-from tirelib.signal import LowPass
 
-TRIAL = 1e-3
 SMALLEST_TOLERANCE = 1e-4
 
 
@@ -48,32 +43,6 @@ class Whitening:
         return white
 
 
-def whitening(
-    waveform: FloatArray,
-    values: Mapping[str, float | FloatArray],
-    points: Operating,
-    tolerance: Tolerance,
-    angle_std: FloatArray,
-    noise: float,
-    low_pass: LowPass,
-) -> Whitening:
-    """Return the whitening at a model, with set points that act as on the linear ring.
-
-    Parameters
-    ----------
-    waveform : shape (n_runs, n_phi)
-        Of the model at `values`.
-    tolerance : Tolerance
-        Relative standard deviations of load, pressure and gain.
-    angle_std : shape (n_runs,), [rad]
-        Of the angle's zero; infinite is a free shift.
-    noise : float, [-]
-        Standard deviation of a sample of a run's waveform.
-    """
-    tangent = random_tangents(waveform, values, points, low_pass)
-    return whitening_of(tangent, scales(tolerance, angle_std), noise)
-
-
 def whitening_of(tangent: FloatArray, scale: FloatArray, noise: float) -> Whitening:
     """Return the whitening by noise and set points at a model's tangents.
 
@@ -100,25 +69,6 @@ def scales(tolerance: Tolerance, angle_std: FloatArray) -> FloatArray:
 def tangents(waveform: FloatArray, by_load: FloatArray, by_pressure: FloatArray) -> FloatArray:
     """Return slopes by relative load, relative pressure, gain and angle, (n_runs, n_phi, 4)."""
     return np.stack([by_load, by_pressure, waveform, angle_slope(waveform)], axis=2)
-
-
-def random_tangents(
-    waveform: FloatArray,
-    values: Mapping[str, float | FloatArray],
-    points: Operating,
-    low_pass: LowPass,
-) -> FloatArray:
-    """Return the slopes of `tangents`, those by load and pressure of the linear ring."""
-    n = len(points)
-    # differences of one and the same model: the linear ring, without effects
-    three = points.tiled(3)
-    load, pressure = three.load.copy(), three.pressure.copy()
-    load[n : 2 * n] *= 1.0 + TRIAL
-    pressure[2 * n :] *= 1.0 + TRIAL
-    waves = predict(values, replace(three, load=load, pressure=pressure), low_pass=low_pass).wave
-    by_load = (waves[n : 2 * n] - waves[:n]) / TRIAL
-    by_pressure = (waves[2 * n :] - waves[:n]) / TRIAL
-    return tangents(waveform, by_load, by_pressure)
 
 
 def angle_slope(waveform: FloatArray) -> FloatArray:

@@ -80,7 +80,6 @@ RULES = {
 }
 """What is watched, of each wheel but for the last two, which are of the run. A starting point for
 whoever knows the rig: none of these limits was measured."""
-OF_RUN = ("minutes_left", "disk")
 
 
 def read_alarms(path: Path) -> dict[str, Rule]:

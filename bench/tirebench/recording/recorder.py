@@ -3,7 +3,6 @@
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -255,11 +254,6 @@ def finish(path: Path, length: int, reason: str) -> None:
         log.finish()
     except OSError as error:
         raise unwritable(path, error) from None
-
-
-def next_part(header: RecordingHeader) -> RecordingHeader:
-    """Return the header of the part that follows."""
-    return replace(header, part=header.part + 1)
 
 
 def unwritable(path: Path, error: OSError) -> RecordingError:
