@@ -9,6 +9,7 @@ from scipy import stats
 from tirelib.arrays import FloatArray
 from tirelib.compare.error import ModelError
 from tirelib.compare.sectors import SECTORS, sectors_of
+from tirelib.compare.sentences import PLACES
 from tirelib.identify.error_bands import levels
 from tirelib.model.state import Operating
 from tirelib.waveforms import GRID
@@ -20,14 +21,6 @@ LEAST, TINY = 1e-3, 1e-12
 MOST = 0.7
 """Share of the squares that the told range of angles holds."""
 CONDITIONS = ("load", "pressure", "speed", "slip_angle", "camber", "slip_ratio")
-_PLACES = {
-    "contact": "in the contact",
-    "entry edge": "at the entry of the contact",
-    "exit edge": "at the exit of the contact",
-    "entry flank": "before the contact",
-    "exit flank": "behind the contact",
-    "far side": "away from the contact",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +88,7 @@ def left_of(error: ModelError, points: Operating, beyond: FloatArray | None = No
     powers = _powers(points, np.sqrt(squares.mean(axis=1)))
     return Left(
         white,
-        f"{_PLACES[first]} ({100 * shares[first]:.0f} % of the squares), most of it "
+        f"{PLACES[first]} ({100 * shares[first]:.0f} % of the squares), most of it "
         f"{told_range(start, stop)}",
         told_powers(powers),
         (start, stop),
