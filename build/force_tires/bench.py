@@ -7,7 +7,7 @@ from tirelib.identify.brush_model import BrushModel
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.force_noise import force_noise
 from tirelib.identify.force_points import force_points
-from tirelib.infer.forces import ForceProblem
+from tirelib.problems.forces import ForceProblem
 
 
 def problem_of(data: ForceData, quantity: str) -> ForceProblem:

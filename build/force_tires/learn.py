@@ -24,11 +24,11 @@ from force_tires.bench import problem_of
 from force_tires.families import FAMILIES
 from force_tires.plans import case
 from tirelib.errors import TirelibError
-from tirelib.infer.forces import ForceProblem
 from tirelib.infer.hypothesis import judged
 from tirelib.infer.null import OWN
 from tirelib.infer.plain import Family, covering, learn, save
 from tirelib.infer.posterior import Posterior, posterior
+from tirelib.problems.forces import ForceProblem
 from tirelib.threads import one_thread
 
 HERE = Path(__file__).parent

@@ -26,7 +26,6 @@ from tirelib.identify.brush_fit import fit_brush
 from tirelib.identify.brush_model import BrushModel
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.force_points import force_points
-from tirelib.infer.forces import ForceProblem
 from tirelib.infer.problem import Point
 from tirelib.planning.envelope import Envelope
 from tirelib.planning.force_rivals import (
@@ -38,6 +37,7 @@ from tirelib.planning.force_rivals import (
     try_force_suspects,
 )
 from tirelib.planning.next_test import force_next_test
+from tirelib.problems.forces import ForceProblem
 
 NOISE = 8.0
 """Noise of a point's side force [N]."""

@@ -35,7 +35,7 @@ from tirelib.identify.identify import estimated
 from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.plain import load
 from tirelib.infer.select import Verdict, select
-from tirelib.infer.strain import StrainProblem
+from tirelib.problems.strain import StrainProblem
 from tirelib.threads import one_thread
 
 OUTCOMES = ("right", "in a set", "none", "unknown", "form", "wrong", "failed")

@@ -26,7 +26,7 @@ from tirelib.infer.null import OWN, Null
 from tirelib.infer.plain import BASE, Family, load, pooled
 from tirelib.infer.posterior import posterior, sizes_at_start
 from tirelib.infer.problem import Point
-from tirelib.infer.strain import StrainProblem
+from tirelib.problems.strain import StrainProblem
 from tirelib.threads import one_thread
 
 GRID = tuple(0.15 * 2.0 ** np.arange(-3, 4))

@@ -34,7 +34,7 @@ from tirelib.infer.null import OWN
 from tirelib.infer.plain import Family, learn, save
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Point
-from tirelib.infer.strain import StrainProblem
+from tirelib.problems.strain import StrainProblem
 from tirelib.threads import one_thread
 
 ROOT = Path(__file__).parents[2]

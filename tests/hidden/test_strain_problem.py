@@ -14,9 +14,9 @@ from tirelib.identify.literature import literature
 from tirelib.identify.random_effects import scales, tangents
 from tirelib.infer.posterior import posterior
 from tirelib.infer.problem import Point
-from tirelib.infer.strain import StrainProblem
-from tirelib.infer.whiten import Whitener
 from tirelib.model.base import move
+from tirelib.problems.strain import StrainProblem
+from tirelib.problems.whiten_strain import Whitener
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID
 

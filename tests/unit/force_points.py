@@ -11,7 +11,7 @@ from tirelib.identify.brush_law import Reference
 from tirelib.identify.brush_model import BrushModel
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.force_points import force_points
-from tirelib.infer.forces import ForceProblem
+from tirelib.problems.forces import ForceProblem
 
 VALUES = {
     "lateral_stiffness": 8e6,

@@ -18,7 +18,7 @@ from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.plain import BASE, ROUGHLY, Family, load
 from tirelib.infer.problem import Problem
 from tirelib.infer.select import Verdict, select
-from tirelib.infer.strain import StrainProblem
+from tirelib.problems.strain import StrainProblem
 from tirelib.threads import one_thread
 
 TABLE = Path(__file__).parents[1] / "infer" / "plain_tires.npz"

@@ -21,8 +21,8 @@ from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Point
 from tirelib.infer.select import ROUGH, Hypotheses
-from tirelib.infer.strain import StrainProblem
 from tirelib.model.base import move
+from tirelib.problems.strain import StrainProblem
 from tirelib.rolling.solve import Rolling
 
 LEAST_GAIN = 0.02

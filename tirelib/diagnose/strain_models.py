@@ -16,7 +16,7 @@ from tirelib.errors import ConvergenceError
 from tirelib.forked import forked
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.select import Hypotheses
-from tirelib.infer.strain import StrainProblem
+from tirelib.problems.strain import StrainProblem
 
 Progress = Callable[[str], None]
 

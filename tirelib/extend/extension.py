@@ -14,8 +14,8 @@ from tirelib.errors import ParameterError
 from tirelib.extend.step import Step, added, kept, refuse_second, removed
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.select import Hypotheses
-from tirelib.infer.strain import StrainProblem
-from tirelib.infer.strain_living import in_base
+from tirelib.problems.strain import StrainProblem
+from tirelib.problems.strain_living import in_base
 from tirelib.threads import one_thread
 
 

@@ -13,7 +13,7 @@ from tirelib.diagnose.forces.models import ForceModels
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.errors import ParameterError, TirelibError
 from tirelib.extend.step import Step, added, kept, refuse_second, removed
-from tirelib.infer.forces import ForceProblem
+from tirelib.problems.forces import ForceProblem
 from tirelib.threads import one_thread
 
 

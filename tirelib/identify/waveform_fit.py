@@ -16,11 +16,11 @@ import numpy as np
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.errors import ConvergenceError, TirelibError
 from tirelib.forked import forked
-from tirelib.identify.bounded import bounded_step
 from tirelib.identify.delay import earlier
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.fit_cost import Cost, Data
 from tirelib.identify.random_effects import Whitening
+from tirelib.infer.bounded import bounded_step
 from tirelib.model.base import FREE, Coordinate, Linear, move
 from tirelib.model.chain import Changes
 from tirelib.model.slopes import SolutionSlopes, slopes_of

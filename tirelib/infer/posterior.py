@@ -17,7 +17,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, TirelibError
-from tirelib.identify.bounded import bounded_step
+from tirelib.infer.bounded import bounded_step
 from tirelib.infer.normal import LEAST, Normal, Weighed
 from tirelib.infer.plain import BASE, ROUGHLY, View
 from tirelib.infer.problem import Point, Problem

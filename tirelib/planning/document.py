@@ -11,12 +11,12 @@ from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.fit import fit_force
 from tirelib.effects import Effect
 from tirelib.infer.select import Hypotheses
-from tirelib.infer.strain import StrainProblem
 from tirelib.planning.criterion import ENDLESS, NOTHING, RESOLVED, WANTED, NextTest, PairForecast
 from tirelib.planning.envelope import AXES, Envelope
 from tirelib.planning.next_test import force_next_test, gains, next_test
 from tirelib.planning.repeats import force_gains
 from tirelib.planning.suspects import Suspects, suspects_of
+from tirelib.problems.strain import StrainProblem
 from tirelib.quantities import QUANTITIES
 
 FORMAT = "tirelib-next-test/1"

@@ -7,8 +7,8 @@ import numpy as np
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.fit import ForceFit, Problem
-from tirelib.infer.forces import ANGLE, SET_POINTS
 from tirelib.planning.criterion import Noise
+from tirelib.problems.forces import ANGLE, SET_POINTS
 
 SHARES = (0.0, *(2.0 ** np.arange(-3.0, 0.5, 0.5)).tolist())
 """Sizes of set-point errors that are tried, over those of a diagnosis."""

@@ -19,7 +19,6 @@ from tirelib.effects import CATALOGUE, Effect
 from tirelib.errors import TirelibError
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.force_points import ForcePoints
-from tirelib.infer.forces import WIDTH, ForceProblem, varies
 from tirelib.infer.hypothesis import SLACK
 from tirelib.infer.plain import pooled
 from tirelib.infer.problem import Point
@@ -28,6 +27,7 @@ from tirelib.planning.envelope import Envelope
 from tirelib.planning.force_noise import Counted, counted_noise, set_points
 from tirelib.planning.on_trial import fitted_rivals
 from tirelib.planning.sweep import campaign_sweep
+from tirelib.problems.forces import WIDTH, ForceProblem, varies
 
 
 @dataclass(frozen=True, slots=True, eq=False)

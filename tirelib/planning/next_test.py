@@ -15,7 +15,6 @@ from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.next_run import next_runs
 from tirelib.infer.problem import Point
 from tirelib.infer.select import Hypotheses
-from tirelib.infer.strain import StrainProblem
 from tirelib.model.state import Operating
 from tirelib.planning.criterion import (
     ENDLESS,
@@ -35,6 +34,7 @@ from tirelib.planning.force_rivals import (
 )
 from tirelib.planning.repeats import PLAN_REPEATS
 from tirelib.planning.suspects import Suspects
+from tirelib.problems.strain import StrainProblem
 from tirelib.threads import one_thread
 
 MANY = 1e3

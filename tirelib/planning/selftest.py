@@ -17,7 +17,7 @@ from tirelib.errors import ParameterError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.chance import Plans
 from tirelib.infer.select import Hypotheses
-from tirelib.infer.strain import StrainProblem
+from tirelib.problems.strain import StrainProblem
 from tirelib.threads import one_thread
 
 RATIOS = (1.05, 1.2, 1.5)

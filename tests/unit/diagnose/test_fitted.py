@@ -22,9 +22,9 @@ from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.delay import UNIT, by_delay, earlier, late
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.select import Hypotheses
-from tirelib.infer.strain import WIDTH, StrainProblem
 from tirelib.model.base import BARE, move, values_of
 from tirelib.model.state import State
+from tirelib.problems.strain import WIDTH, StrainProblem
 from tirelib.waveforms import GRID
 
 DELAY = 4e-5

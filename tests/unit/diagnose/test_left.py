@@ -21,8 +21,8 @@ from tirelib.diagnose.left import left_of, told_range
 from tirelib.effects import CATALOGUE
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.select import Hypotheses
-from tirelib.infer.strain import StrainProblem
 from tirelib.model.base import values_of
+from tirelib.problems.strain import StrainProblem
 from tirelib.waveforms import GRID
 
 

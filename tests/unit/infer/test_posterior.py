@@ -5,7 +5,7 @@ import pytest
 from scipy import optimize
 
 from tests.unit.infer.linear_problem import EFFECTS, N, Toy, drawn, family
-from tirelib.identify.bounded import bounded_step
+from tirelib.infer.bounded import bounded_step
 from tirelib.infer.posterior import posterior
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tests.unit.identify.model_waves import TIRE, operating
-from tirelib.infer.strain_laws import GOES, PLACED, as_large, beside, law_errors, stiffened
 from tirelib.model.base import PLAIN, values_of
 from tirelib.model.state import State
+from tirelib.problems.strain_laws import GOES, PLACED, as_large, beside, law_errors, stiffened
 from tirelib.waveforms import GRID
 
 LOAD = np.array([2000.0, 4000.0, 6000.0])

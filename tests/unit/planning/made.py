@@ -11,7 +11,6 @@ from tirelib.diagnose.diagnose import plain_tires
 from tirelib.effects import CATALOGUE
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.infer.select import Hypotheses
-from tirelib.infer.strain import StrainProblem
 from tirelib.model import solution
 from tirelib.model.base import operating_points, values_of
 from tirelib.model.state import Operating
@@ -19,6 +18,7 @@ from tirelib.planning.criterion import NextTest
 from tirelib.planning.envelope import Envelope
 from tirelib.planning.next_test import next_test
 from tirelib.planning.suspects import Suspects, given_suspects
+from tirelib.problems.strain import StrainProblem
 
 NOISE = 2e-6
 PLANTED, TWIN = "temperature", "dynamic_stiffening"

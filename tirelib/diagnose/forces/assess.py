@@ -19,8 +19,8 @@ from tirelib.identify.force_bench import Changes
 from tirelib.identify.force_data import force_data
 from tirelib.identify.force_noise import force_noise
 from tirelib.identify.force_points import ForcePoints, force_points
-from tirelib.infer.forces import varies
 from tirelib.parameters import TireFile
+from tirelib.problems.forces import varies
 
 MOST_POINTS = 4000
 """Points that are fitted; of a longer sweep passes are left out evenly."""

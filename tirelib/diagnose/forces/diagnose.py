@@ -11,8 +11,8 @@ from tirelib.diagnose.forces.fit import ForceFit, Problem
 from tirelib.diagnose.forces.models import ForceModels, plain_tires
 from tirelib.diagnose.held_out import pooled
 from tirelib.effects import Effect
-from tirelib.infer.forces import ForceProblem
 from tirelib.infer.select import Verdict, select
+from tirelib.problems.forces import ForceProblem
 from tirelib.threads import one_thread
 
 Steps = tuple[tuple[str, ForceFit], ...]

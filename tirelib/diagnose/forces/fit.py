@@ -11,7 +11,7 @@ from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, TirelibError
 from tirelib.identify.brush_law import SPECS
 from tirelib.identify.force_bench import Changes, ForceBench
-from tirelib.infer.forces import WIDTH, changes_at, fitted_constants, moved_constants
+from tirelib.problems.forces import WIDTH, changes_at, fitted_constants, moved_constants
 
 BEYOND = 0.5
 """Share of its range by which a strength may leave it in a fit."""

@@ -8,8 +8,8 @@ import numpy as np
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.diagnose.forces.fit import ForceFit, Problem
 from tirelib.diagnose.left import FLAT, Power, powers_of
-from tirelib.infer.forces import slip_of, varies
 from tirelib.model.brush import BrushConditions
+from tirelib.problems.forces import slip_of, varies
 
 BANDS = (
     (0.0, 1.0, "where most of the contact sticks"),

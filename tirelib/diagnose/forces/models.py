@@ -12,9 +12,9 @@ from tirelib.diagnose.forces.held_out import errors_of, force_folds
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 from tirelib.forked import forked
-from tirelib.infer.forces import ForceProblem
 from tirelib.infer.plain import Family, covering, load
 from tirelib.infer.select import Hypotheses
+from tirelib.problems.forces import ForceProblem
 
 TABLES = Path(__file__).parents[2] / "infer"
 """Where the tables of what plain tires show are (`build/force_tires/learn.py`)."""

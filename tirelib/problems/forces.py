@@ -16,9 +16,9 @@ from tirelib.identify.brush_law import SPECS
 from tirelib.identify.discrepancy import bumps
 from tirelib.identify.force_bench import Changes, ForceBench
 from tirelib.infer.problem import Point
-from tirelib.infer.whiten_forces import PointWhitener
 from tirelib.model.brush import BrushConditions, BrushState, brush_forces
 from tirelib.model.brush_slopes import STEP, StateSlopes, moment_of
+from tirelib.problems.whiten_forces import PointWhitener
 
 COORDINATES: Mapping[str, tuple[str, ...]] = {
     "Fy": ("lateral_stiffness", "friction", "load_power", "slip_angle_offset", "Fy_offset"),

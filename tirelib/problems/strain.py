@@ -18,15 +18,15 @@ from tirelib.identify.delay import STD, UNIT, by_delay, earlier
 from tirelib.identify.literature import literature
 from tirelib.identify.random_effects import scales, tangents
 from tirelib.infer.problem import Point
-from tirelib.infer.strain_laws import SHAPES, as_large, beside, law_errors, stiffened
-from tirelib.infer.strain_living import in_base, living
-from tirelib.infer.whiten import INSIDE, Whitener
 from tirelib.model import solution
 from tirelib.model.base import coordinates, move
 from tirelib.model.chain import Changes
 from tirelib.model.slopes import SolutionSlopes, added_by_values, by_effects, by_values
 from tirelib.model.solution import Solution
 from tirelib.model.state import Operating, State
+from tirelib.problems.strain_laws import SHAPES, as_large, beside, law_errors, stiffened
+from tirelib.problems.strain_living import in_base, living
+from tirelib.problems.whiten_strain import INSIDE, Whitener
 from tirelib.rolling.assemble import Unknowns
 from tirelib.rolling.solve import Rolling
 from tirelib.waveforms import GRID
