@@ -60,7 +60,7 @@ def fit_of(family: str, seed: int, quantity: str) -> Fit | None:
         spread = {effect.name: FIRST["effect"] for effect in problem.living}
         groups = problem.remainder(problem.start, problem.solve(problem.start))
         spread |= dict.fromkeys(groups, FIRST["shape"])
-        return problem, posterior(problem, (), spread, OWN[2])
+        return problem, posterior(problem, (), spread, problem.whitener(OWN[2]))
     except TirelibError as error:
         say(f"{family} {seed} {quantity}: {error}")
         return None

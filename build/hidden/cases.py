@@ -21,10 +21,10 @@ from hidden.measured import CACHE, Plain, Planted, blank, keep, plain, traces, w
 from hidden.plan import day
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.errors import TirelibError
-from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.delay import earlier
+from tirelib.identify.campaign_data import Data, straight_runs
 from tirelib.identify.identify import estimated
-from tirelib.identify.waveform_fit import Data, WaveformFit
+from tirelib.identify.waveform_fit import WaveformFit
+from tirelib.model.slopes import slopes_of
 from tirelib.rig.hidden import HIDDEN
 from tirelib.rig.observe import Trace
 from tirelib.waveforms import Waveforms
@@ -257,15 +257,13 @@ class _Search:
         waves, fit = self._waves({name: strength}), self.plain_fit
         used = straight_runs(self.floor_waves.take(~self.held_out)).gages
         change = (waves.strain - self.floor_waves.strain)[~self.held_out][:, used].mean(axis=1)
-        slopes = fit.linear.waveform_slopes
-        white = fit.whiten(slopes).reshape(len(slopes), -1)
-        moved = np.linalg.lstsq(white.T, fit.whiten(change).ravel(), rcond=None)[0]
+        whiten, slopes = fit.whiten.strain, slopes_of(fit.model, fit.free).waveform[:-2]
+        white = whiten(slopes).reshape(len(slopes), -1)
+        moved = np.linalg.lstsq(white.T, whiten(change).ravel(), rcond=None)[0]
         own = change - np.tensordot(moved, slopes, axes=1)
-        data = self.plain_data
-        rest = earlier(data.strain, data.points.omega, fit.delay) - fit.linear.waveform
         return max(
-            _root(own, rest, self.floor, ratio),
-            _root(fit.whiten(own), fit.whiten(rest), fit.error, ratio),
+            _root(own, fit.rest, self.floor, ratio),
+            _root(whiten(own), whiten(fit.rest), fit.error, ratio),
         )
 
 

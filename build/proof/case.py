@@ -34,7 +34,8 @@ def fingerprint() -> str:
     names = (
         "identify",
         "waveform_fit",
-        "fit_cost",
+        "whiten_runs",
+        "waveform_problem",
         "discrepancy",
         "structure",
         "campaign_data",

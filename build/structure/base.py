@@ -114,11 +114,11 @@ def row(case: Case, without: Sequence[str], prior: Mapping[str, float]) -> Row:
 def _stiffness(fit: WaveformFit, runs: StraightRuns, case: Case) -> float:
     """Return the median relative error of the vertical stiffness over the runs."""
     points = runs.data().points
-    here = solved(fit.values, points, low_pass=fit.cost.data.low_pass)
+    here = solved(fit.values, points, low_pass=fit.problem.data.low_pass)
     more = solved(
         fit.values,
         replace(points, load=points.load * (1.0 + NUDGE)),
-        low_pass=fit.cost.data.low_pass,
+        low_pass=fit.problem.data.low_pass,
         start=here.rolling,
     )
     found = points.load * NUDGE / (more.deflection - here.deflection)

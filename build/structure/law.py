@@ -73,7 +73,7 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
             problem,
             [CATALOGUE[kind]],
             pooled(others, sizes_at_start(problem)),
-            own,
+            problem.whitener(own),
             start=start,
         )
     except TirelibError as error:

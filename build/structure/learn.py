@@ -114,7 +114,7 @@ def fit_of(file: Path) -> Fit | None:
         spread = {effect.name: FIRST["effect"] for effect in problem.living}
         groups = problem.remainder(problem.start, problem.solve(problem.start))
         spread |= dict.fromkeys(groups, FIRST["shape"])
-        fit = posterior(problem, (), spread, OWN[1])
+        fit = posterior(problem, (), spread, problem.whitener(OWN[1]))
     except TirelibError as error:
         say(f"{file.name}: {error}")
         return None

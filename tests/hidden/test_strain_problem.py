@@ -111,7 +111,7 @@ def test_a_planted_strength_comes_back(problem: StrainProblem) -> None:
         },
         strain=with_it.waveform,
     )
-    fit = posterior(made, (effect,), {}, OWN)
+    fit = posterior(made, (effect,), {}, made.whitener(OWN))
     assert fit.point.strengths[0] == pytest.approx([0.15], rel=0.03)
     # the priors of a strength and of the base leave it short by no more than its deviation
     assert abs(fit.point.strengths[0][0] - 0.15) < fit.std(0)[0]

@@ -72,5 +72,11 @@ def test_a_plain_tire_is_rejected_only_if_it_hides_something(
     groups = problem.remainder(problem.start, problem.solve(problem.start))
     spread |= dict.fromkeys(groups, FIRST["shape"])
     with one_thread():
-        found = judged(problem, posterior(problem, (), spread, OWN[2]), table, 0.05, own_effects=0)
+        found = judged(
+            problem,
+            posterior(problem, (), spread, problem.whitener(OWN[2])),
+            table,
+            0.05,
+            own_effects=0,
+        )
     assert low < found.p <= high

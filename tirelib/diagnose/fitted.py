@@ -18,9 +18,9 @@ from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 from tirelib.identify.delay import UNIT
 from tirelib.infer.hypothesis import Hypothesis
-from tirelib.infer.posterior import Posterior, posterior
+from tirelib.infer.posterior import ROUGH, Posterior, posterior
 from tirelib.infer.problem import Point
-from tirelib.infer.select import ROUGH, Hypotheses
+from tirelib.infer.select import Hypotheses
 from tirelib.model.base import move
 from tirelib.problems.strain import StrainProblem
 from tirelib.rolling.solve import Rolling
@@ -108,7 +108,7 @@ class Fitted:
             part,
             self.effects,
             among.spread,
-            among.own,
+            part.whitener(among.own),
             start=start,
             settled=ROUGH,
         )
@@ -164,10 +164,9 @@ def least_error(model: Fitted, given: Model, yardstick: Yardstick) -> tuple[Mode
                 alone,
                 model.effects,
                 {},
-                among.own,
+                partial(_flat, reached),
                 near=found,
                 start=None if found else point,
-                whiten=partial(_flat, reached),
                 settled=LEAST_GAIN * yardstick.strain.size,
             )
             numbers = move(alone.values, found.point.base[:-1], alone.free)

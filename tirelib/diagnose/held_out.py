@@ -10,9 +10,8 @@ from tirelib.arrays import BoolArray
 from tirelib.compare.error import ModelError, Yardstick
 from tirelib.diagnose.fitted import Fitted
 from tirelib.errors import TirelibError
-from tirelib.identify.campaign_data import LEAST_RUNS
+from tirelib.identify.campaign_data import LEAST_RUNS, Data
 from tirelib.identify.error_bands import levels
-from tirelib.identify.waveform_fit import Data
 from tirelib.quantities import QUANTITIES
 
 LEAST_LOADS, LEAST_PRESSURES = 3, 2

@@ -7,7 +7,6 @@ import numpy as np
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.campaign import Tolerance
 from tirelib.errors import CalibrationError
-from tirelib.identify.fit_cost import Data
 from tirelib.identify.noise import RepeatNoise, measured_tangents, repeat_noise
 from tirelib.identify.strain_notes import (
     LEAST_LOAD_RATIO,
@@ -19,10 +18,13 @@ from tirelib.identify.strain_notes import (
     some_gage_works,
 )
 from tirelib.model.base import operating_points
+from tirelib.model.state import Operating
+from tirelib.signal import LowPass
 from tirelib.waveforms import GRID, Waveforms
 
 __all__ = [
     "LEAST_RUNS",
+    "Data",
     "StraightRuns",
     "straight_noise",
     "straight_runs",
@@ -37,8 +39,43 @@ STRUCTURE = 0.016
 """White part of the structural misfit, relative to the rms strain."""
 MIDDLE = 0.05
 """Half of the angle below the axle over which the sign of the strain is looked at, [rad]."""
+LEAST_DEFLECTIONS = 3
+"""Measured deflections below which none takes part in a fit."""
 GEOMETRY_ERROR = 1e-3
 """By which lengths of a tire may contradict each other, [m]: as a tape measure does."""
+
+
+@dataclass(frozen=True, slots=True)
+class Data:
+    """What is fitted: the waveforms of one gage and, where measured, the deflections.
+
+    Attributes
+    ----------
+    strain : shape (n_runs, n_phi), [-]
+    points : Operating
+    angle_std : shape (n_runs,), [rad]
+    tolerance : Tolerance
+    noise : float, [-]
+    low_pass : LowPass
+    deflection : shape (n_runs,), [m]
+        Free radius less measured loaded radius; NaN where not measured.
+    deflection_std : float, [m]
+        Random part of it.
+    """
+
+    strain: FloatArray
+    points: Operating
+    angle_std: FloatArray
+    tolerance: Tolerance
+    noise: float
+    low_pass: LowPass
+    deflection: FloatArray
+    deflection_std: float = 1e-4
+
+    @property
+    def with_deflection(self) -> bool:
+        """Whether enough deflections are known."""
+        return int(np.isfinite(self.deflection).sum()) >= LEAST_DEFLECTIONS
 
 
 @dataclass(frozen=True, slots=True)

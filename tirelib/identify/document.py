@@ -52,7 +52,7 @@ def _vertical_stiffness(found: Identification) -> dict[str, float | None]:
     """Return the slope of load over deflection in the middle of the loads, [N/mm]."""
     runs = found.runs
     load = runs.waves.conditions["Fz"]
-    model = _slope(found.fit.linear.deflection, load)
+    model = _slope(found.fit.model.deflection, load)
     known = np.isfinite(runs.deflection)
     measured = _slope(runs.deflection[known], load[known]) if known.sum() >= 3 else None
     return {"load_N": float(load.mean()), "model": model, "measured": measured}

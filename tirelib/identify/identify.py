@@ -180,7 +180,7 @@ def estimated(
     )
     estimates = [estimate(fit, k, start) for k in range(len(fit.free))]
     if any("not_identifiable" in e.flags for e in estimates):
-        ways = next_run(fit, structure_std(start, fit.free), discrepancy)
+        ways = next_run(fit, structure_std(start, fit.free))
         estimates = [
             replace(e, helps=_help(e, fit, k, ways)) if "not_identifiable" in e.flags else e
             for k, e in enumerate(estimates)

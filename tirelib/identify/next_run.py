@@ -21,11 +21,11 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.errors import TirelibError
 from tirelib.forked import forked
-from tirelib.identify.discrepancy import Discrepancy
-from tirelib.identify.fit_cost import nuisance_shapes
 from tirelib.identify.laboratory import Test, laboratory_tests
 from tirelib.identify.random_effects import scales, tangents, whitening_of
 from tirelib.identify.waveform_fit import WaveformFit
+from tirelib.identify.waveform_problem import MISFIT
+from tirelib.infer.plain import BASE
 from tirelib.model.slopes import SolutionSlopes, slopes_of
 from tirelib.model.solution import Solution, solved
 from tirelib.model.state import Operating
@@ -101,13 +101,10 @@ class _State:
 
     @classmethod
     def of(cls, fit: WaveformFit, structure: FloatArray) -> Self:
-        cost, linear = fit.cost, fit.linear
-        k = len(fit.free)
-        every = cost.rows(linear.waveform_slopes, linear.deflection_slopes)
-        every = np.concatenate([every, cost.white_shapes])
-        information = every @ every.T + np.eye(len(every))
-        information[:k, :k] += np.diag(1.0 / fit.prior_std**2 - 1.0)
-        return cls(information, structure**2)
+        problem, rows = fit.problem, fit.found.rows
+        every = fit.whiten(np.concatenate([rows[BASE], rows[MISFIT]]))
+        prior = np.concatenate([problem.widths**-2, np.ones(len(rows[MISFIT]))])
+        return cls(every @ every.T + np.diag(prior), structure**2)
 
     def covariance(self, more: FloatArray | None = None) -> FloatArray:
         """Return the covariance of the coordinates by the fit, after a run."""
@@ -133,7 +130,7 @@ class _State:
         return [Remedy(test.words, float(h), len(test.rows)) for h in 1.96 * np.sqrt(total)]
 
 
-def next_run(fit: WaveformFit, structure: FloatArray, discrepancy: Discrepancy | None) -> NextRun:
+def next_run(fit: WaveformFit, structure: FloatArray) -> NextRun:
     """Weigh runs inside a moderately extended envelope of the campaign, and laboratory tests.
 
     Parameters
@@ -141,20 +138,18 @@ def next_run(fit: WaveformFit, structure: FloatArray, discrepancy: Discrepancy |
     fit : WaveformFit
     structure : shape (n_free,)
         Structural standard deviation of each coordinate.
-    discrepancy : Discrepancy or None
-        As in the fit.
     """
     state = _State.of(fit, structure)
-    points, series = _candidates(fit.cost.data.points)
+    points, series = _candidates(fit.problem.data.points)
     each = [points.take([i]) for i in range(len(points))]
-    added = forked([partial(_information, fit, discrepancy, point) for point in each])
+    added = forked([partial(_information, fit, point) for point in each])
     runs = []
     for words, which in series:
         parts = [added[i] for i in which]
         known = [part for part in parts if part is not None]
         if len(known) == len(parts):
             runs.append(state.after_run(words, len(parts), np.sum(known, axis=0)))
-    pressure = fit.cost.data.points.pressure
+    pressure = fit.problem.data.points.pressure
     span = (BELOW * float(pressure.min()), ABOVE * float(pressure.max()))
     tests = list(laboratory_tests(fit.values, fit.free, span))
     press = _press_test(fit)
@@ -223,7 +218,7 @@ def _run(points: Operating, which: Sequence[int]) -> str:
 
 def _solved(fit: WaveformFit, points: Operating) -> tuple[Solution, SolutionSlopes] | None:
     """Return the fitted model at points; None where it has no solution."""
-    low_pass = fit.cost.data.low_pass
+    low_pass = fit.problem.data.low_pass
     try:
         model = solved(fit.values, points, low_pass=low_pass)
         return model, slopes_of(model, fit.free)
@@ -231,15 +226,13 @@ def _solved(fit: WaveformFit, points: Operating) -> tuple[Solution, SolutionSlop
         return None
 
 
-def _information(
-    fit: WaveformFit, discrepancy: Discrepancy | None, points: Operating
-) -> FloatArray | None:
+def _information(fit: WaveformFit, points: Operating) -> FloatArray | None:
     """Return what one run would add, over coordinates and misfit; None without a solution."""
     at = _solved(fit, points)
     if at is None:
         return None
     model, slopes = at
-    data, k = fit.cost.data, len(fit.free)
+    problem, data = fit.problem, fit.problem.data
     known = data.angle_std[np.isfinite(data.angle_std)]
     angle = float(np.median(known)) if known.size else np.inf
     whiten = whitening_of(
@@ -247,16 +240,15 @@ def _information(
         scales(data.tolerance, np.full(len(points), angle)),
         data.noise,
     )
-    rows = [whiten(slopes.waveform[:k])]
-    radius = float(np.max(fit.values["free_radius"]))
-    rows.append(whiten(nuisance_shapes(discrepancy, model, points, radius)))
-    each = np.concatenate(rows).reshape(-1, data.strain.shape[1])
+    strain = problem.by_coordinates(model, slopes, fit.delay)
+    shapes = problem.misfit(model.waveform, model.deflection, points)
+    each = whiten(np.concatenate([strain, shapes])).reshape(-1, data.strain.shape[1])
     return np.asarray(each @ each.T)
 
 
 def _press_test(fit: WaveformFit) -> Test | None:
     """Return the vertical stiffness in the middle of the campaign, from two loads."""
-    have = fit.cost.data.points
+    have = fit.problem.data.points
     load, pressure = float(np.median(have.load)), float(np.median(have.pressure))
     points = replace(
         have.take(np.zeros(2, dtype=int)),

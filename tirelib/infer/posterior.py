@@ -20,13 +20,16 @@ from tirelib.errors import ConvergenceError, TirelibError
 from tirelib.infer.bounded import bounded_step
 from tirelib.infer.normal import LEAST, Normal, Weighed
 from tirelib.infer.plain import BASE, ROUGHLY, View
-from tirelib.infer.problem import Point, Problem
+from tirelib.infer.problem import Model, Point, Problem
 
 MOST_STEPS = 60
 SETTLED = 0.1
 """Fall of the cost that a step has to promise, or a fit has settled, in units of a chi-square: as
 much as a number that moves by a third of its standard deviation. Where a model leaves more than a
 unit of each number, the unit grows with it."""
+ROUGH, ROUNDS = 5.0, 5
+"""`SETTLED` where errors are asked for and no strengths, or a whitening follows the fit; and most
+times that it does."""
 STILL = 0.1
 """Move of a strength of the model's effects, in standard deviations, below which it has settled."""
 IDLE = 4
@@ -47,8 +50,15 @@ LONGEST = 1.0
 HARDEST = 1e4
 """Damping at which there is no way down."""
 
+NEAR, FOLLOWED = 1.0, 25
+"""Move of a coordinate, in standard deviations, below which a whitening that follows the fit is
+kept, for it hardly changes any more; and steps after which it is kept in any case: following the
+solution, a fit may go in circles."""
+
 Spread = Mapping[str, float]
 """Variances of what plain tires show, by block."""
+Whiten = Callable[[FloatArray], FloatArray]
+"""Turns rows (k, ...) into whitened ones (k, n)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,14 +164,15 @@ class Posterior:
 
 
 def posterior(
-    problem: Problem,
+    problem: Model,
     effects: Sequence[Effect],
     spread: Spread,
-    own: float,
+    whiten: Whiten,
     *,
+    follow: Callable[[Any], Whiten] | None = None,
     near: Posterior | None = None,
     start: Point | None = None,
-    whiten: Callable[[FloatArray], FloatArray] | None = None,
+    damping: float = 0.0,
     settled: float = SETTLED,
     progress: Callable[[str], None] | None = None,
 ) -> Posterior:
@@ -172,19 +183,22 @@ def posterior(
 
     Parameters
     ----------
-    problem : Problem
+    problem : Model
     effects : sequence of Effect
     spread : mapping
         Variances of what plain tires show.
-    own : float
-        Size of each run's own misfit (`Problem.whitener`).
+    whiten : callable
+        Turns rows (k, ...) into whitened ones (k, n), for instance `Problem.whitener`.
+    follow : callable, optional
+        Gives a whitening about a solution. It is asked for until a step moves every coordinate by
+        less than `NEAR`, or after `FOLLOWED` steps; the given whitening is the first one.
     near : Posterior, optional
         A fit nearby.
     start : Point, optional
         From where the fit starts, with the strengths of its first effects; the fit nearby or the
         problem's start, without effects, by default.
-    whiten : callable, optional
-        Turns rows (k, ...) into whitened ones (k, n); the problem's whitening by default.
+    damping : float
+        Of the first step, relative to the curvature by each coordinate.
     settled : float
         Fall of the cost that a step has to promise.
     progress : callable, optional
@@ -197,7 +211,6 @@ def posterior(
     names = {effect.name for effect in effects}
     others = [effect for effect in problem.living if effect.name not in names]
     point = _start(problem, [*effects, *others], near, start)
-    whiten = whiten or problem.whitener(own)
     widths = [problem.widths, np.ones(sum(e.components for e in effects))]
     widths += [np.full(e.components, np.sqrt(max(spread.get(e.name, 0.0), LEAST))) for e in others]
     width = np.concatenate(widths)
@@ -206,23 +219,22 @@ def posterior(
     known = None if near is None or start is not None else near.slopes_at(point)
     slopes = problem.slopes(point, solved) if known is None else known
     exact = known is None or (near is not None and near.point.effects == point.effects)
-    shapes = problem.remainder(point, solved)
-    white = whiten(np.concatenate(list(shapes.values())))
-    ends = np.cumsum([len(rows) for rows in shapes.values()])[:-1]
-    whitened = dict(zip(shapes, np.split(white, ends), strict=True))
-    rest = whiten(solved.rest)
+    whitened, rest = _white(whiten, problem.remainder(point, solved)), whiten(solved.rest)
     asked = slice(len(point.base), len(width) - sum(e.components for e in others))
-    damping, idle = 0.0, 0
-    for _ in range(MOST_STEPS):
+    idle, moved = 0, np.inf
+    for count in range(MOST_STEPS):
+        if follow is not None and 0 < count <= FOLLOWED and moved > NEAR:
+            whiten = follow(solved)
+            whitened, rest = _white(whiten, problem.remainder(point, solved)), whiten(solved.rest)
         white_slopes = whiten(slopes)
-        rows = np.concatenate([white_slopes, white])
+        rows = np.concatenate([white_slopes, *whitened.values()])
         normal = Normal.of({BASE: white_slopes, **whitened}, rest)
         metric = Weighed(normal, normal.spread(spread))
         block = normal.blocks[BASE]
         here = coordinates_of(point)
         gram = metric.gram[block, block] + np.diag(width**-2)
         gradient = metric.right(normal.right)[block] - here / width**2
-        cost = _cost(metric, normal.right, normal.square, here, width)
+        cost = cost_of(metric, normal.right, normal.square, here, width)
         deviation = np.sqrt(np.diag(np.linalg.inv(gram)))
         within = low - here, high - here
         trial, dz = None, bounded_step(gram, gradient, *within)
@@ -236,12 +248,12 @@ def posterior(
             tried = _tried(problem, point, share * dz, solved)
             if tried is not None:
                 left = whiten(tried[1].rest)
-                after = _cost(
+                after = cost_of(
                     metric, rows @ left, float(left @ left), coordinates_of(tried[0]), width
                 )
                 brought = (cost - after) / (share * _fall(gram, gradient, dz))
                 if brought > LEAST_FALL:
-                    trial = tried
+                    trial, moved = tried, share * float(np.abs(dz / deviation).max())
                     break
             damping = max(10.0 * damping, FIRST)
         if trial is None:
@@ -251,7 +263,7 @@ def posterior(
             slopes, exact, damping = problem.slopes(point, solved), True, 0.0
             continue
         (point, solved), rest = trial, left
-        brings = max(little, LOOSE * (cost - FAR * rest.size))
+        brings = max(little, SETTLED * cost / rest.size, LOOSE * (cost - FAR * rest.size))
         idle = idle + 1 if cost - after < brings else 0
         if idle == IDLE:
             cost = after
@@ -262,7 +274,7 @@ def posterior(
         slopes, exact = problem.slopes(point, solved, near=True), False
     else:
         raise ConvergenceError(
-            f"fit with {', '.join(e.name for e in effects) or 'no effect'}: after {MOST_STEPS} "
+            f"fit of {', '.join(e.name for e in effects) or 'the base'}: after {MOST_STEPS} "
             f"steps the cost still falls by {promised:.2g}; the model does not fit these runs: "
             "look at them with `tirelib compare`",
             point,
@@ -289,7 +301,7 @@ def posterior(
 
 
 def explaining(
-    problem: Problem, point: Point, solved: Any, count: int
+    problem: Model, point: Point, solved: Any, count: int
 ) -> tuple[dict[str, FloatArray], FloatArray]:
     """Return everything that may explain what a model leaves, and the slopes of all coordinates.
 
@@ -309,7 +321,7 @@ def explaining(
     return every, slopes
 
 
-def sizes_at_start(problem: Problem) -> dict[str, float]:
+def sizes_at_start(problem: Model) -> dict[str, float]:
     """Return mean squares of rows as `Posterior.sizes`, of the model where a fit starts."""
     point = _start(problem, [*problem.start.effects, *problem.living], None, problem.start)
     solved = problem.solve(point)
@@ -328,8 +340,14 @@ def _sizes(rows: Mapping[str, FloatArray], own: Sequence[Effect]) -> dict[str, f
     return {name: float(np.mean(block**2)) for name, block in each.items()}
 
 
+def _white(whiten: Whiten, rows: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return named rows whitened."""
+    ends = np.cumsum([len(block) for block in rows.values()])[:-1]
+    return dict(zip(rows, np.split(whiten(np.concatenate(list(rows.values()))), ends), strict=True))
+
+
 def _start(
-    problem: Problem, effects: Sequence[Effect], near: Posterior | None, start: Point | None
+    problem: Model, effects: Sequence[Effect], near: Posterior | None, start: Point | None
 ) -> Point:
     """Return the point from which a fit starts."""
     given = list(start.strengths if start else ())
@@ -346,7 +364,7 @@ def coordinates_of(point: Point) -> FloatArray:
     return np.concatenate([point.base, *point.ranges])
 
 
-def _ends(problem: Problem, others: Sequence[Effect], count: int) -> tuple[FloatArray, FloatArray]:
+def _ends(problem: Model, others: Sequence[Effect], count: int) -> tuple[FloatArray, FloatArray]:
     """Return the ends of all coordinates: the base's, and what a tire shows is within its range."""
     low, high = np.full(count, -np.inf), np.full(count, np.inf)
     base = slice(0, len(problem.widths))
@@ -364,7 +382,7 @@ def _fall(gram: FloatArray, gradient: FloatArray, dz: FloatArray) -> float:
     return float(2.0 * gradient @ dz - dz @ gram @ dz)
 
 
-def _tried(problem: Problem, point: Point, dz: FloatArray, solved: Any) -> tuple[Point, Any] | None:
+def _tried(problem: Model, point: Point, dz: FloatArray, solved: Any) -> tuple[Point, Any] | None:
     """Return the model a step away; None where it has no solution."""
     k = len(point.base)
     cuts = np.cumsum([e.components for e in point.effects])[:-1]
@@ -379,9 +397,9 @@ def _tried(problem: Problem, point: Point, dz: FloatArray, solved: Any) -> tuple
         return None
 
 
-def _cost(
+def cost_of(
     metric: Weighed, right: FloatArray, square: float, here: FloatArray, widths: FloatArray
 ) -> float:
-    """Return J for a residual with these products."""
+    """Return J for a residual with these products, at coordinates with these prior widths."""
     left = square - float(right @ metric.mean(right))
     return left + float(np.sum((here / widths) ** 2))

@@ -25,18 +25,13 @@ from tirelib.errors import ParameterError, TirelibError
 from tirelib.forked import forked
 from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.plain import Family, pooled
-from tirelib.infer.posterior import Posterior, posterior, sizes_at_start
+from tirelib.infer.posterior import ROUGH, ROUNDS, Posterior, posterior, sizes_at_start
 from tirelib.infer.problem import Point, Problem
 from tirelib.infer.rival import p_against
 from tirelib.threads import one_thread
 
 SINGLES, PARTNERS, LEADERS = 6, 3, 2
 """Hypotheses that are fitted exactly: single effects, partners of each leader, and leaders."""
-ROUNDS = 5
-"""Most times that the whitening follows the fit without further effects."""
-ROUGH = 5.0
-"""Fall of the cost that a step has to promise, in units of a chi-square, where errors are asked for
-and no strengths."""
 MOST = 3
 """Effects of a hypothesis at most."""
 ALIKE = np.deg2rad(80.0)
@@ -168,7 +163,8 @@ class Hypotheses:
         self.problem.forget()
         try:
             effects = [*self.had, *more]
-            fit = posterior(self.problem, effects, self.spread, self.own, near=near.fit)
+            whiten = self.problem.whitener(self.own)
+            fit = posterior(self.problem, effects, self.spread, whiten, near=near.fit)
             return self._tested(self.problem, fit)
         except TirelibError:
             return None
@@ -242,7 +238,8 @@ class Hypotheses:
     def _fit(self, problem: Problem, **how: Any) -> Posterior:
         """Return the fit without further effects; a copy of the first process says nothing."""
         progress = self.progress if os.getpid() == self._process else None
-        return posterior(problem, self.had, self.spread, self.own, progress=progress, **how)
+        whiten = problem.whitener(self.own)
+        return posterior(problem, self.had, self.spread, whiten, progress=progress, **how)
 
     def _tested(self, problem: Problem, fit: Posterior) -> Hypothesis:
         had = len(self.had)

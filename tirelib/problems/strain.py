@@ -17,7 +17,7 @@ from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.delay import STD, UNIT, by_delay, earlier
 from tirelib.identify.literature import literature
 from tirelib.identify.random_effects import scales, tangents
-from tirelib.infer.problem import Point
+from tirelib.infer.problem import FOLLOWED, Point
 from tirelib.model import solution
 from tirelib.model.base import coordinates, move
 from tirelib.model.chain import Changes
@@ -62,10 +62,6 @@ NEAR = 0.05
 """Move of a strength, in ranges, within which what it adds to the slopes is kept."""
 NEAR_BASE = 0.03
 """The same of the base's coordinates."""
-FOLLOWED = 0.003
-"""Change of the waveforms, over the strain, below which a whitening need not follow a fit. A base
-that lacks an effect is then as likely from any start: with a stiffness a quarter off, its cost is
-4626, 4623 and 4661; with .01 it is 4626, 4474 and 5026."""
 FEW = 15
 """Runs with which a fit may begin: the others only make it more accurate. To diagnose two campaigns
 of 66 runs takes 87 and 194 s of CPU with it, 91 and 185 with half, 94 and 143 with double, 110 and

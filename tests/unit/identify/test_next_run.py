@@ -7,10 +7,10 @@ import pytest
 
 from tests.unit.identify.model_waves import TIRE, exact_waveform, made_waves, operating
 from tirelib.identify import next_run as module
-from tirelib.identify.campaign_data import straight_runs
+from tirelib.identify.campaign_data import Data, straight_runs
 from tirelib.identify.laboratory import SIDEWALL, TREAD, laboratory_tests
 from tirelib.identify.next_run import NextRun, next_run
-from tirelib.identify.waveform_fit import Data, Prior, WaveformFit, fit_waveforms
+from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
 from tirelib.model.base import BARE, values_of
 from tirelib.model.state import Operating
 
@@ -46,7 +46,7 @@ def fit(data: Data) -> WaveformFit:
 
 @pytest.fixture(scope="module")
 def ways(fit: WaveformFit) -> NextRun:
-    return next_run(fit, STRUCTURE, None)
+    return next_run(fit, STRUCTURE)
 
 
 def added(data: Data, load: float, pressure: float, speed: float) -> Data:
@@ -123,7 +123,7 @@ def test_a_run_beyond_the_tire_is_left_out(
     fit: WaveformFit, ways: NextRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "ABOVE", 8.0)
-    fewer = next_run(fit, STRUCTURE, None)
+    fewer = next_run(fit, STRUCTURE)
     assert 0 < len(fewer.runs[0]) < len(ways.runs[0])
 
 

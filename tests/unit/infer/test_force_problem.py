@@ -81,7 +81,7 @@ def test_shapes_are_what_the_base_cannot_mimic() -> None:
 
 def test_a_planted_strength_comes_back_with_its_interval() -> None:
     made = force_problem(friction_power=-0.15)
-    fit = posterior(made, [CATALOGUE["friction_load"]], {}, 0.0005)
+    fit = posterior(made, [CATALOGUE["friction_load"]], {}, made.whitener(0.0005))
     assert fit.strengths[0][0] == pytest.approx(0.15, abs=4.0 * fit.std(0)[0])
     assert fit.std(0)[0] < 0.02
 

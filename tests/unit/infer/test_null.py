@@ -29,7 +29,7 @@ def test_a_chi_square_has_normal_scores(count: int) -> None:
 
 def plain(families: tuple[Family, ...]) -> Hypothesis:
     toy = Toy(drawn(np.random.default_rng(2)))
-    fit = posterior(toy, (), FAMILIES[0].shown(), 0.001)
+    fit = posterior(toy, (), FAMILIES[0].shown(), toy.whitener(0.001))
     return judged(toy, fit, families, 0.05, own_effects=0)
 
 
@@ -38,7 +38,7 @@ def test_what_is_on_the_side_of_no_effect_is_unknown_and_counts_half(
 ) -> None:
     """A twist is 0 to 2: less than none is not a twist, and something is there all the same."""
     toy = Toy(drawn(np.random.default_rng(2), twist=-1.0))
-    fit = posterior(toy, (), FAMILIES[0].shown(), 0.001)
+    fit = posterior(toy, (), FAMILIES[0].shown(), toy.whitener(0.001))
     found = judged(toy, fit, FAMILIES, 0.05, own_effects=0)
     assert found.p <= 0.05
     half = found.scores
@@ -47,7 +47,7 @@ def test_what_is_on_the_side_of_no_effect_is_unknown_and_counts_half(
     assert half["twist"] == pytest.approx(0.5 * whole["twist"])
     assert half["bend"] == whole["bend"]
     more = Toy(drawn(np.random.default_rng(2), twist=1.0))
-    fit = posterior(more, (), FAMILIES[0].shown(), 0.001)
+    fit = posterior(more, (), FAMILIES[0].shown(), more.whitener(0.001))
     assert judged(more, fit, FAMILIES, 0.05, own_effects=0).scores["twist"] > 5.0
 
 
@@ -95,7 +95,7 @@ def test_the_free_belt_has_a_size_of_its_own(monkeypatch: pytest.MonkeyPatch) ->
         toy = Belt(random.standard_normal(N))
         size = np.sqrt(families[0].shown()["smooth, free belt"])
         toy.measured = toy.measured + 1.8 * size * random.standard_normal(SHAPES) @ toy.there
-        fit = posterior(toy, (), families[0].shown(), 0.001)
+        fit = posterior(toy, (), families[0].shown(), toy.whitener(0.001))
         return judged(toy, fit, families, 0.05, own_effects=0)
 
     families = tuple(belt(each) for each in FAMILIES)

@@ -30,7 +30,7 @@ def test_p_values_of_plain_tires_lie_under_the_diagonal() -> None:
     p = []
     for _ in range(60):
         toy = Toy(drawn(random))
-        fit = posterior(toy, (), spread, 0.001)
+        fit = posterior(toy, (), spread, toy.whitener(0.001))
         p.append(judged(toy, fit, FAMILIES, 0.05, own_effects=0).p)
     for level in (0.05, 0.1, 0.2, 0.5):
         share = np.mean(np.array(p) <= level)
@@ -248,7 +248,7 @@ class Followed(Valleys):
 def test_starts_that_end_in_one_model_go_on_as_one() -> None:
     toy = Followed(2.0, -1.5, 3.0)
     spread = FAMILIES[0].shown()
-    fits = [posterior(toy, (), spread, 0.001, start=start) for start in toy.starts]
+    fits = [posterior(toy, (), spread, toy.whitener(0.001), start=start) for start in toy.starts]
     best, stuck = _apart(toy, toy.starts, fits)
     assert best.base[0] == pytest.approx(2.71, abs=0.1)
     assert stuck.base[0] == pytest.approx(-1.0, abs=0.1)
