@@ -95,7 +95,7 @@ def test_held_out_errors_are_of_runs_that_the_fit_has_not_seen(
     monkeypatch.setattr(Fitted, "without_runs", trained)
     strain = data.strain + 1e-3 * load.out[:, None] * np.cos(3.0 * GRID)
     spoiled = Yardstick.of(replace(runs(), strain=strain))
-    (error,) = held_out(plain, [load], spoiled)
+    error = held_out(plain, load, spoiled)
     assert error is not None
     assert seen[0].max() < LOADS[-1]
     assert error.value == pytest.approx(spoiled.take(load.out).error(plain.model, 0.0).value)
