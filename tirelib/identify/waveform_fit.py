@@ -188,16 +188,16 @@ def _ridges(
     problem: WaveformProblem, found: Posterior, whiten: RunWhitening
 ) -> tuple[FloatArray, BoolArray]:
     """Return 95 % intervals along the ridges, and where the surface is quadratic."""
-    white = whiten(np.concatenate([found.rows[BASE], found.rows[MISFIT]]))
-    normal = Normal.of(found.rows, found.solved.rest, whiten)
-    metric = Weighed(normal, normal.spread(SPREAD))
+    white = {name: whiten(found.rows[name]) for name in (BASE, MISFIT)}
+    normal = Normal.of(white, whiten(found.solved.rest))
+    metric, every = Weighed(normal, normal.spread(SPREAD)), np.concatenate(list(white.values()))
 
     def cost(base: FloatArray) -> float:
         solved = found.solved
         if base is not found.point.base:
             solved = problem.solve(Point(base), found.solved)
         rest = whiten(solved.rest)
-        return cost_of(metric, white @ rest, float(rest @ rest), base, problem.widths)
+        return cost_of(metric, every @ rest, float(rest @ rest), base, problem.widths)
 
     def rise(move: FloatArray) -> float:
         """Return how much higher the cost is after a move; infinite where the model fails."""
