@@ -32,7 +32,7 @@ class BusCondition:
     measured: Measured
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class Block:
     """The next samples, or the next condition, of one wheel.
 

@@ -72,7 +72,7 @@ def added(one: Sequence[int], two: Sequence[int]) -> list[int]:
     return [a + b for a, b in zip_longest(one, two, fillvalue=0)]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class Samples:
     """Samples that follow each other without a gap in time.
 
