@@ -74,6 +74,7 @@ KNOWN_NAMES: Mapping[str, str] = {
     "LAENGSSCHLUPF": "slip_ratio",
     "FUELLDRUCK": "pressure",
     "LUFTDRUCK": "pressure",
+    "DRUCK": "pressure",
     "REIFENDRUCK": "pressure",
     "REIFENFUELLDRUCK": "pressure",
     "GESCHWINDIGKEIT": "speed",
