@@ -288,6 +288,9 @@ def test_a_data_set_that_cannot_serve_is_refused_before_any_work(
         ("estimate", {}, "--calibration is missing"),
         ("check", {"model": "table-6-1"}, "takes no --model"),
         ("estimate", {"calibration": "nowhere"}, "neither a file nor a data set"),
+        ("diagnose", {"model": "nowhere"}, "no data set of `tirelib fleet`; .*no such file"),
+        ("diagnose", {"model": __file__}, f"--model {__file__}: is not TOML"),
+        ("estimate", {"calibration": __file__}, f"--calibration {__file__}: .*TOML"),
     ],
 )
 def test_a_wrong_recipe_is_refused(
@@ -297,6 +300,24 @@ def test_a_wrong_recipe_is_refused(
     data.open()
     with pytest.raises((ParameterError, FormatError), match=said):
         engine.recipe_of(task, data, files=files)
+
+
+@pytest.mark.parametrize("form", ["--effects {}", "--effects={}"])
+def test_a_file_among_the_options_counts_by_its_content(
+    form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    data = DataSet(str(tmp_path / "out"))
+    data.open()
+    seen = []
+    for name, text in (("mine.py", "a = 1"), ("mine.py", "a = 2"), ("copy.py", "a = 2")):
+        (tmp_path / name).write_text(text)
+        recipe = engine.recipe_of(
+            "diagnose", data, files={"model": "table-6-1"}, options=form.format(name).split()
+        )
+        assert recipe.options == tuple(form.format(tmp_path / name).split())
+        seen.append(recipe.hash)
+    assert seen[0] != seen[1] == seen[2]
 
 
 def test_paths_without_campaigns_and_foreign_folders_are_refused(tmp_path: Path) -> None:
@@ -345,7 +366,7 @@ def test_a_storage_without_keys_is_said() -> None:
         DataSet("locked://a").open()
 
 
-@pytest.mark.parametrize("more", ["--nosuch 3", "--quick 'x", "--order few"])
+@pytest.mark.parametrize("more", ["--nosuch 3", "--quick 'x", "--order few", "--json a.json"])
 def test_wrong_options_of_the_verb_are_said_once_before_any_work(
     more: str, campaigns: Path, tmp_path: Path
 ) -> None:

@@ -108,6 +108,7 @@ def _read(folder: Path) -> None:
         (("FL_strain_{}", "other_{}"), "'other_1' is there 0 times"),
         (("vehicle_speed", "FL_pressure"), "unit 'bar' is a unit of pressure"),
         (("tirelib-recording/1", "tirelib-recording/2"), "'tirelib-recording/1' is read"),
+        (('format = "tirelib-recording/1"', ""), "format: the key is missing"),
         (("[wheels.FL.conditions]", "[wheels.FL.condition]"), "the key is unknown"),
     ],
 )

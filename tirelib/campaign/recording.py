@@ -131,7 +131,8 @@ def read_recording(path: str | Path) -> Recording:
         problems.append(Problem(f"{folder / FILE}, {key}", given, allowed, remedy))
 
     if document.get("format") != FORMAT:
-        fault("format", f"{document.get('format')!r}", f"{FORMAT!r} is read", "correct it")
+        given = repr(document["format"]) if "format" in document else "the key is missing"
+        fault("format", given, f"{FORMAT!r} is read", "correct it")
     axes = document.get("axes")
     if axes not in FLIPPED:
         fault("axes", f"{axes!r}", f"{', '.join(FLIPPED)} are allowed", "name the axis system")

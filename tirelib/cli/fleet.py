@@ -1,5 +1,6 @@
 """``tirelib fleet``: a verb over many campaigns and recordings."""
 
+import math
 import shlex
 import sys
 import time
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 FORMAT = "tirelib-fleet-run/1"
 TASKS = ("check", "features", "calibrate", "estimate", "identify", "compare", "diagnose")
 SHOWN = 5
+OWN = frozenset({"--json", "--out", "--report", "--calibration", "--model", "--help"})
+"""Options of a verb that the fleet gives itself, or has as its own."""
 
 _EXAMPLE = """\b
 Examples:
@@ -193,6 +196,11 @@ def _options(task: str, more: str) -> list[str]:
         given, *_ = verb.make_parser(context).parse_args(list(options))
         for option in verb.params:
             if isinstance(option, click.Option) and option.name in given:
+                if own := sorted(OWN.intersection(option.opts)):
+                    raise ValueError(
+                        f"{own[0]} is set by the fleet; leave it out (`tirelib fleet --help` "
+                        "lists the fleet's own options)"
+                    )
                 option.type_cast_value(context, given[option.name])
     except (ValueError, click.UsageError) as error:
         said = error.format_message() if isinstance(error, click.UsageError) else str(error)
@@ -204,7 +212,7 @@ def _options(task: str, more: str) -> list[str]:
 def _progress(task: str) -> Iterator[Callable[["Counts"], None]]:
     """Yield a function that shows how far the fleet is: a bar, or a line now and then."""
     console = Console(stderr=True)
-    last = time.monotonic()
+    last = -math.inf  # the first line comes at once: a campaign may take minutes
     if not console.is_terminal:
 
         def line(counts: "Counts") -> None:

@@ -13,7 +13,7 @@ import pyarrow.dataset as pads
 from distributed import Client, Future, as_completed
 
 from tirelib import __version__
-from tirelib.errors import FormatError, ParameterError
+from tirelib.errors import FormatError, ParameterError, TirelibError
 from tirelib.fleet.dataset import ALSO_AS, ALSO_AT, DataSet, Finished, Rows
 from tirelib.fleet.rows import Row
 from tirelib.fleet.sources import Source, fingerprint
@@ -104,20 +104,38 @@ def recipe_of(
         if name != needed:
             raise ParameterError(f"fleet {task}: takes no --{name}; leave it out")
     content = {name: _taken(data, name, given) for name, given in files.items()}
-    whole = json.dumps([task, list(options), {name: h for name, (_, h) in content.items()}])
+    given = [_by_content(option) for option in options]
+    whole = json.dumps(
+        [task, [known for _, known in given], {name: h for name, (_, h) in content.items()}]
+    )
     return Recipe(
         task,
-        tuple(options),
+        tuple(option for option, _ in given),
         {name: path for name, (path, _) in content.items()},
         reports,
         sha256(whole.encode()).hexdigest(),
     )
 
 
+def _by_content(option: str) -> tuple[str, str]:
+    """Return an option for workers of another folder, and what it is known by.
+
+    That is the option itself, or the content of the file that it names (``mine.py``,
+    ``--tire=T.toml``), so that results of a file that has changed are not taken for finished.
+    """
+    name, equals, value = option.rpartition("=") if option.startswith("--") else ("", "", option)
+    path = Path(value)
+    if not value or not path.is_file():
+        return option, option
+    digest = sha256(path.read_bytes()).hexdigest()
+    return f"{name}{equals}{path.resolve()}", f"{name}{equals}{digest}"
+
+
 def _taken(data: DataSet, name: str, given: str) -> tuple[str, str]:
     """Put a file, or the index of a data set of such files, into the data set."""
     path = Path(given)
     if path.is_file():
+        _check_readable(name, path)
         content, ending = path.read_bytes(), path.name
     else:
         other = DataSet(given)
@@ -135,13 +153,28 @@ def _taken(data: DataSet, name: str, given: str) -> tuple[str, str]:
     return place, digest
 
 
+def _check_readable(name: str, path: Path) -> None:
+    """Refuse once, before any work, what every task would refuse."""
+    from tirelib.estimators.calibration_file import read_calibration
+    from tirelib.parameters import read_tire
+
+    try:
+        read_calibration(path) if name == "calibration" else read_tire(path)
+    except TirelibError as error:
+        raise FormatError(f"--{name} {error}") from None
+
+
 def _shipped(data: DataSet, name: str) -> tuple[str, str]:
     """Write a tire that ships with tirelib as a file."""
     from tirelib.parameters import read_tire, write_tire
 
+    try:
+        tire = read_tire(name)
+    except ParameterError as error:
+        raise FormatError(f"--model {name}: no data set of `tirelib fleet`; {error}") from None
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "model.toml")
-        write_tire(read_tire(name), path, "tirelib-model/1")
+        write_tire(tire, path, "tirelib-model/1")
         return _taken(data, "model", str(path))
 
 
