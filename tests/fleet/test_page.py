@@ -201,6 +201,27 @@ def test_campaigns_of_one_name_are_told_apart_and_negative_answers_shown(tmp_pat
     assert all(said in page for said in NOT_YET.values())  # nothing is said to be in order
 
 
+def test_too_few_tires_and_recordings_are_not_said_to_be_alike(tmp_path: Path) -> None:
+    data = DataSet(str(tmp_path / "data"))
+    data.open()
+    rng = np.random.default_rng(9)
+    for task, made in (("identify", identified(rng)), ("estimate", driven(rng))):
+        rows = made["container_metrics"]
+        few = {row["container_id"] for row in rows if row["tire"] in ("tire 00", "tire 01")}
+        few = {k for k in few if task == "identify" or k % DAYS < 4}
+        data.add(
+            task,
+            {
+                name: [row for row in rows if row["container_id"] in few]
+                for name, rows in made.items()
+            },
+        )
+    page = Path(write_fleet_page(data)).read_text()
+    assert "at least 5 campaigns of one size of tire are needed, here are 2" in page
+    assert "at least 5 recordings of one wheel are needed, here are 4" in page
+    assert "no tire, beyond its interval" not in page
+
+
 def test_a_click_on_a_point_opens_its_campaign(data: DataSet) -> None:
     with chromium() as browser:
         page = browser.new_page(viewport={"width": 1200, "height": 900})

@@ -13,7 +13,13 @@ import pyarrow.dataset as pads
 from tirelib.arrays import FloatArray
 from tirelib.fleet.dataset import ALSO_AT, DataSet
 from tirelib.fleet.siblings import join
-from tirelib.fleet.spread import FALSE_ALARM, change_of, spread_of
+from tirelib.fleet.spread import (
+    FALSE_ALARM,
+    FEWEST_IN_TIME,
+    FEWEST_SPREAD,
+    change_of,
+    spread_of,
+)
 from tirelib.fleet.tables import PARTITION
 from tirelib.report.fleet import fleet_parts, write_fleet
 
@@ -52,6 +58,7 @@ def fleet_document(data: DataSet) -> dict[str, Any]:
     return {
         "format": "tirelib-fleet-page/1",
         "containers": list(containers.values()),
+        "fewest": {"tires": FEWEST_SPREAD, "in_time": FEWEST_IN_TIME},
         "parameters": _parameters(data, containers, sizes),
         "changes": _changes(data, containers),
         "effects": _effects(data, containers),

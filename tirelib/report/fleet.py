@@ -60,13 +60,18 @@ def _lines(document: Mapping[str, Any]) -> list[tuple[str, str]]:
     failed = sum(each["number"] for each in document["failures"])
     gains = [row["gain"] for each in document["parameters"] for row in each["joined"]]
     count = ", ".join(f"{name} in {count}" for name, count in named.most_common())
-    usual = "no tire, beyond its interval and the scatter of the others"
-    still = "none, beyond the scatter of the recordings"
+    tires = max((len(each["points"]) for each in document["parameters"]), default=0)
+    times = max((len(each["time"]) for each in document["changes"]), default=0)
+    usual = _judged(tires, document["fewest"]["tires"], "campaigns of one size of tire", "identify")
+    still = _judged(times, document["fewest"]["in_time"], "recordings of one wheel", "estimate")
     lines = [
-        ("Stand out", _some(odd) or (usual if document["parameters"] else NOT_YET["identify"])),
+        (
+            "Stand out",
+            _some(odd) or usual or "no tire, beyond its interval and the scatter of the others",
+        ),
         (
             "Change with time",
-            _some(changing) or (still if document["changes"] else NOT_YET["estimate"]),
+            _some(changing) or still or "none, beyond the scatter of the recordings",
         ),
         ("Effects", count or ("none named" if document["effects"] else NOT_YET["diagnose"])),
         ("Failed", f"{failed}, see the causes below" if failed else "none"),
@@ -83,9 +88,25 @@ def _lines(document: Mapping[str, Any]) -> list[tuple[str, str]]:
     return lines
 
 
+def _judged(count: int, fewest: int, of: str, task: str) -> str:
+    """Return why so many values do not tell anything, or an empty text."""
+    if not count:
+        return NOT_YET[task]
+    return f"not known: at least {fewest} {of} are needed, here are {count}" * (count < fewest)
+
+
 def _some(items: Sequence[str]) -> str:
     more = f", and {len(items) - 6} more" if len(items) > 6 else ""
     return ", ".join(items[:6]) + more
+
+
+def _scattered(each: Mapping[str, Any]) -> str:
+    """Say mean and scatter of a number; one value has no scatter."""
+    if len(each["points"]) == 1:
+        return "One value, which scatters about nothing. "
+    unit = "" if each["unit"] == "1" else f" {each['unit']}"
+    scatter = number(each["scatter"])
+    return f"Mean {number(each['centre'])}, scatter between tires {scatter}{unit}. "
 
 
 def fleet_parts(document: Mapping[str, Any]) -> list[Part]:
@@ -175,8 +196,7 @@ def _parameter_plot(index: int, each: Mapping[str, Any]) -> Plot:
         f"parameter-{index}",
         f"{each['name'].replace('_', ' ')}"
         + (f", free radius {each['size']}" * bool(each["size"])),
-        f"Mean {number(each['centre'])}, scatter between tires {number(each['scatter'])}"
-        f"{f' {unit}' if (unit := each['unit']) != '1' else ''}. ",
+        _scattered(each),
         figure,
         ("tire", "campaign", "value", "low", "high", "stands out"),
         [[p["tire"], p["campaign"], p["value"], p["low"], p["high"], p["outlier"]] for p in points],
