@@ -21,7 +21,7 @@ from hidden.measured import CACHE, Plain, Planted, blank, keep, plain, traces, w
 from hidden.plan import day
 from tirelib.arrays import BoolArray, FloatArray
 from tirelib.errors import TirelibError
-from tirelib.identify.campaign_data import Data, straight_runs
+from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
 from tirelib.identify.waveform_fit import WaveformFit
 from tirelib.model.slopes import slopes_of
@@ -87,11 +87,6 @@ class Case:
         return all(HIDDEN[name].known for name in self.names)
 
 
-def fitted_data(waves: Waveforms, held_out: BoolArray) -> Data:
-    """Return the runs that are fitted, as data of a fit."""
-    return straight_runs(waves.take(~held_out)).data(with_deflection=False)
-
-
 def base_fit(waves: Waveforms, held_out: BoolArray) -> WaveformFit:
     """Identify the base model from the runs that are fitted."""
     return estimated(straight_runs(waves.take(~held_out)))[1]
@@ -142,7 +137,6 @@ class _Search:
     ) -> None:
         self.base, self.kind, self.floor_waves = base, kind, floor_waves
         self.progress, self.held_out = progress, base.day.held_out
-        self.plain_data = fitted_data(floor_waves, self.held_out)
         self.plain_fit = base_fit(floor_waves, self.held_out)
         self.floor = self.plain_fit.rms
         self.nodes: dict[str, dict[float, Waveforms]] = {}

@@ -37,8 +37,8 @@ LATEST = 5.0
 class Counts:
     """How far a fleet has come.
 
-    Of the known, `copies` have the content of another source, here or in an earlier run; `negative`
-    are those of the finished whose answer is negative.
+    Among the known, `copies` have the content of another source, here or in an earlier run;
+    `negative` counts the finished whose answer is negative.
     """
 
     total: int = 0

@@ -40,7 +40,7 @@ STRUCTURE = 0.016
 MIDDLE = 0.05
 """Half of the angle below the axle over which the sign of the strain is looked at, [rad]."""
 LEAST_DEFLECTIONS = 3
-"""Measured deflections below which none takes part in a fit."""
+"""Measured deflections below which none takes part in a fit: zero, slope and one to check them."""
 GEOMETRY_ERROR = 1e-3
 """By which lengths of a tire may contradict each other, [m]: as a tape measure does."""
 

@@ -33,8 +33,9 @@ SETTLED = 1e-3
 much as a number that moves by a thirtieth of its standard deviation."""
 FIRST = 1.0
 """Damping to begin with. A fit that begins with whole Gauss-Newton steps far away ends in another
-valley now and then: of two tires of the ring with a crowned tread, at a cost of 66 and 30 instead
-of 24 and 22."""
+valley now and then. That was seen with a former solver of the same cost: two tires of the ring with
+a crowned tread ended at 66 and 30 instead of 24 and 22. With this one a campaign with a hidden
+effect is fitted in 13 steps, and without damping in 34."""
 SPREAD = {MISFIT: 1.0}
 """Variance of the coefficients of the structural misfit's rows."""
 PROBE = 2.0

@@ -1,8 +1,8 @@
 """The problem of identification: waveforms and deflections of runs, and the numbers of a tire.
 
 Coordinates are those of the tire about its start and, behind them, the delay of the gages against
-the trigger. The structural misfit (`discrepancy`) is a group of rows beside the model, each for one
-standard deviation.
+the trigger. The structural misfit (`discrepancy`) is a sum of smooth shapes that is fitted beside
+the model; each shape is a row, as large as one standard deviation of its coefficient.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,7 +41,7 @@ class WaveformSolved:
     point : Point
     model : Solution
     waveform : shape (n_runs, n_phi)
-        Of the model, with the delay.
+        The model's, with the delay.
     """
 
     rest: FloatArray

@@ -17,7 +17,8 @@ from tirelib.identify.campaign_data import Data
 from tirelib.identify.random_effects import Whitening, scales, tangents, whitening_of
 
 ZERO = 5e-4
-"""Common error of the measured deflections: free radius, [m]."""
+"""Common error of the measured deflections: free radius, [m]. This size and the two below are
+assumed; what half and double of them do has not been measured."""
 DEPTH_SHARE = 0.03
 """Structural part of them, in proportion to the deflection."""
 GROWTH = 5e-4
@@ -62,7 +63,7 @@ class Depth:
         by_set_point : shape (n_runs, 2), [m]
             Slopes of the deflection by relative load and pressure.
         whiten, tangent, scale
-            Of the strain.
+            The whitening, tangents and standard deviations of the strain.
         """
         known = np.isfinite(data.deflection)
         # b: load, pressure, gain, angle in units of their deviations; strain A b, deflection d b

@@ -198,7 +198,7 @@ def posterior(
         From where the fit starts, with the strengths of its first effects; the fit nearby or the
         problem's start, without effects, by default.
     damping : float
-        Of the first step, relative to the curvature by each coordinate.
+        Damping of the first step, relative to the curvature by each coordinate.
     settled : float
         Fall of the cost that a step has to promise.
     progress : callable, optional

@@ -121,7 +121,7 @@ def test_a_misfit_widens_the_intervals_and_takes_up_structure() -> None:
     both = fit_waveforms(measured, values_of(START), WIDE, free=BARE, discrepancy=Discrepancy())
     assert (np.diag(both.covariance)[:7] > np.diag(alone.covariance)[:7]).all()
     assert len(alone.found.rows[MISFIT]) == 0
-    # the misfit that is likeliest beside the model
+    # the likeliest misfit, given the fitted model
     rows = both.found.rows[MISFIT]
     normal = Normal.of({MISFIT: rows}, both.found.solved.rest, both.whiten)
     likeliest = np.linalg.solve(normal.gram + np.eye(len(rows)), normal.right) @ rows
