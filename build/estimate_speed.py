@@ -1,9 +1,10 @@
 """CPU time of features and estimates of a campaign: the compiled core beside numpy.
 
-    python build/estimate_speed.py CAMPAIGN CALIBRATION.toml [--runs 24] [--repeat 5]
+    python build/estimate_speed.py CAMPAIGN CALIBRATION.toml [--runs 24] [--repeat 20]
 
 Times are of one thread, without reading the files, and the least of the repetitions: on a machine
-that others use, the others only add to them. The same numbers come out of both, which is checked.
+that others use, the others only add to them. Both are timed in turn, so that they have the same
+quiet moments. The same numbers come out of both, which is checked.
 """
 
 import argparse
@@ -16,21 +17,17 @@ import numpy as np
 
 from tirelib.campaign import conditions_of, read_campaign
 from tirelib.estimators.calibration_file import read_calibration
-from tirelib.features import features_of_record
+from tirelib.features import RecordReader, concatenate_features
 from tirelib.features.extract import reference_features
-from tirelib.observations import concatenate_features
 from tirelib.signal import LowPass, TurnCutter, stack_turns
 from tirelib.threads import one_thread
 
 
-def least(work: Callable[[], Any], repeat: int) -> tuple[float, Any]:
-    """Return the least CPU time of a piece of work [s], and its result."""
-    times = []
-    for _ in range(repeat):
-        begin = time.thread_time()
-        result = work()
-        times.append(time.thread_time() - begin)
-    return min(times), result
+def timed(work: Callable[[], Any]) -> tuple[float, Any]:
+    """Return the CPU time of a piece of work [s], and its result."""
+    begin = time.thread_time()
+    result = work()
+    return time.thread_time() - begin, result
 
 
 def main() -> None:
@@ -39,7 +36,7 @@ def main() -> None:
     options.add_argument("campaign")
     options.add_argument("calibration")
     options.add_argument("--runs", type=int, default=24)
-    options.add_argument("--repeat", type=int, default=5)
+    options.add_argument("--repeat", type=int, default=20)
     given = options.parse_args()
     known, campaign = read_calibration(given.calibration), read_campaign(given.campaign)
     lateral = campaign.header.gage_lateral
@@ -56,29 +53,30 @@ def main() -> None:
         return concatenate_features(parts)
 
     def by_core() -> Any:
-        return concatenate_features(
-            features_of_record(run.strain, run.rate, lateral, low_pass=low_pass, **held)
-            for run, held in records
-        )
+        reader = RecordReader(lateral, low_pass)
+        for run, held in records:
+            reader.add(run.strain, run.rate, **held)
+        return reader.features()
 
-    rows = []
-    for features, estimate in (
-        (by_numpy, known.reference_estimate),
-        (by_core, known.estimate),
-    ):
-        cut, found = least(features, given.repeat)
-        told, result = least(lambda e=estimate, f=found: e(f), given.repeat)
-        rows.append((cut, told, result))
-    for quantity, values in rows[0][2].value.items():
-        np.testing.assert_allclose(rows[1][2].value[quantity], values, 1e-8, 1e-8)
+    ways = {"numpy": (by_numpy, known.reference_estimate), "core": (by_core, known.estimate)}
+    least = dict.fromkeys(ways, np.full(2, np.inf))
+    values = {}
+    for _ in range(given.repeat):
+        for name, (features, estimate) in ways.items():
+            cut, found = timed(features)
+            told, result = timed(lambda e=estimate, f=found: e(f))
+            least[name] = np.minimum(least[name], (cut, told))
+            values[name] = result.value
+    for quantity, wanted in values["numpy"].items():
+        np.testing.assert_allclose(values["core"][quantity], wanted, 1e-8, 1e-8)
     samples = sum(run.strain.shape[1] for run, _ in records)
     sys.stdout.write(f"{len(records)} runs, {samples} samples, {len(found)} turns\n")
-    for name, (cut, told, _) in zip(("numpy", "core"), rows, strict=True):
+    for name, (cut, told) in least.items():
         sys.stdout.write(
             f"{name}: features {1e3 * cut:.1f} ms, estimates {1e3 * told:.1f} ms, "
             f"together {1e3 * (cut + told):.1f} ms\n"
         )
-    ratio = sum(rows[0][:2]) / sum(rows[1][:2])
+    ratio = least["numpy"].sum() / least["core"].sum()
     sys.stdout.write(f"the core takes a {ratio:.1f}th of the time\n")
 
 

@@ -1,7 +1,7 @@
 """Observations of a campaign: the features of every turn, with the values that the rig measured."""
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.campaign import Campaign, CampaignHeader, Run, conditions_of
 from tirelib.errors import CalibrationError
-from tirelib.features.extract import Features, features_of_record
+from tirelib.features import Features, RecordReader
 from tirelib.flags import INVALIDATING
 from tirelib.signal import LowPass
 from tirelib.sizes import differing
@@ -76,30 +76,28 @@ def measure_run(
     run: Run, header: CampaignHeader, low_pass: LowPass | None = None
 ) -> tuple[Features, dict[str, FloatArray]]:
     """Return the features of a run's turns and the rig's measurements for each of them."""
+    reader = RecordReader(header.gage_lateral, low_pass)
+    truth = _read(reader, run, header)
+    return reader.features(), truth
+
+
+def _read(reader: RecordReader, run: Run, header: CampaignHeader) -> dict[str, FloatArray]:
+    """Let the reader take a run; return the rig's measurements for each of its turns."""
     if run.strain is None:
         raise CalibrationError(
             f"{header.name}, run {run.plan.run}: the file holds no strain; "
             "strain_1 .. strain_N are needed"
         )
     held: Any = conditions_of(run, run.time())
-    features = features_of_record(
-        run.strain,
-        run.rate,
-        header.gage_lateral,
-        trigger=run.trigger,
-        low_pass=low_pass,
-        **held,
+    time, omega = reader.add(
+        run.strain, run.rate, trigger=run.trigger, start=run.start_time, **held
     )
-    features = replace(
-        features, time=features.time + run.start_time, ready=features.ready + run.start_time
-    )
-    truth = {name: truth_of(run, name, features) for name in TRUTH}
-    return features, truth
+    return {name: truth_of(run, name, time, omega) for name in TRUTH}
 
 
-def truth_of(run: Run, name: str, features: Features) -> FloatArray:
+def truth_of(run: Run, name: str, time: FloatArray, omega: FloatArray) -> FloatArray:
     """Rig quantity for each turn: mean over the run; in a sweep, over a turn about the contact."""
-    n = len(features)
+    n = time.size
     samples, clock = run.rig.get(name), run.rig_time
     if samples is None or clock is None or samples.size == 0:
         return np.full(n, np.nan)
@@ -110,9 +108,9 @@ def truth_of(run: Run, name: str, features: Features) -> FloatArray:
         return np.full(n, float(samples[known].mean()))
     total = np.concatenate(([0.0], np.cumsum(np.where(known, samples, 0.0))))
     count = np.concatenate(([0], np.cumsum(known)))
-    half = np.pi / np.where(features.omega > 0.0, features.omega, np.inf)
-    start = np.searchsorted(clock, features.time - half)
-    stop = np.searchsorted(clock, features.time + half)
+    half = np.pi / np.where(omega > 0.0, omega, np.inf)
+    start = np.searchsorted(clock, time - half)
+    stop = np.searchsorted(clock, time + half)
     held = count[stop] - count[start]
     mean = (total[stop] - total[start]) / np.maximum(held, 1)
     return np.asarray(np.where(held > 0, mean, np.nan), dtype=np.float64)
@@ -139,16 +137,15 @@ def observe(
         If the campaigns are of different tires or gage layouts, or hold no complete turn.
     """
     same_tire([campaign.header for campaign in campaigns])
-    parts: list[Features] = []
+    reader = RecordReader(campaigns[0].header.gage_lateral, low_pass)
     columns: dict[str, list[FloatArray]] = {name: [] for name in TRUTH}
     points = (*SET_POINTS, *ROAD)
     plans: dict[str, list[FloatArray]] = {name: [] for name in points}
     numbers: list[FloatArray] = []
     for index, campaign in enumerate(campaigns):
         for run in campaign.runs():
-            features, truth = measure_run(run, campaign.header, low_pass)
-            n = len(features)
-            parts.append(features)
+            truth = _read(reader, run, campaign.header)
+            n = len(truth["Fz"])
             for name in TRUTH:
                 columns[name].append(truth[name])
             for name in points:
@@ -160,7 +157,7 @@ def observe(
             )
             if progress is not None:
                 progress(f"{campaign.header.name} run {run.plan.run}")
-    if not parts or not any(len(part) for part in parts):
+    if not any(part.size for part in columns["Fz"]):
         raise CalibrationError(
             f"{', '.join(c.header.name for c in campaigns)}: no contact was found in any run; "
             "look at the strain with `tirelib campaign show`"
@@ -172,7 +169,7 @@ def observe(
     own = np.where(sweep_mask, 1 + number[0] * 1e6 + number[1] * 1e4 + number[3], 0.0)
     group = np.unique(np.vstack((key, own)), axis=1, return_inverse=True)[1].ravel()
     return Observations(
-        features=concatenate_features(parts),
+        features=reader.features(),
         run=number[0].astype(np.int64),
         campaign=number[1].astype(np.int64),
         group=np.asarray(group, dtype=np.int64),
@@ -181,14 +178,6 @@ def observe(
         nominal=nominal,
         headers=tuple(campaign.header for campaign in campaigns),
     )
-
-
-def concatenate_features(parts: Iterable[Features]) -> Features:
-    """Join the turns of several runs of the same gages."""
-    parts = list(parts)
-    names = [field.name for field in fields(Features) if field.name != "lateral"]
-    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    return Features(lateral=parts[0].lateral, **joined)
 
 
 def same_tire(headers: Sequence[CampaignHeader]) -> None:

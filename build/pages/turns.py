@@ -8,8 +8,7 @@ import numpy as np
 
 from tirelib.campaign import Campaign, RunPlan, conditions_of
 from tirelib.errors import CalibrationError
-from tirelib.features.extract import Features, extract_features
-from tirelib.observations import concatenate_features
+from tirelib.features import Features, concatenate_features, extract_features
 from tirelib.signal import LowPass, Turns, cut_turns
 from tirelib.traces import Conditions, StrainTrace
 

@@ -9,10 +9,12 @@ typedef struct {
 } Possible;
 
 /* Minus the logarithm of a normal likelihood. Reference: _surprise */
-static double surprise_of(double apart, double std) {
-    if (!isfinite(std) || !isfinite(apart)) return 0.0;
-    return 0.5 * (apart / std * (apart / std)) + log(std);
+static double surprise_of(double apart, double variance) {
+    if (!isfinite(variance) || !isfinite(apart)) return 0.0;
+    return 0.5 * (apart * apart / variance + log(variance));
 }
+
+static double square(double x) { return x * x; }
 
 /* Reference: _moments */
 static double moments(const double *x, const double *weight, double *variance) {
@@ -57,7 +59,8 @@ static void possible(const Calibration *cal, const SlidingCurve *c, const Seen *
     p->weight[last] = 0.0 * used;
     for (int i = 0; i < POINTS; i++) {
         p->angle[i] = angle_of(k, p->slip[i], s->slip_ratio);
-        p->weight[i] *= hypot(pulled / p->slip[i], 1.0) * (p->angle[i] <= widest ? 1.0 : 0.0);
+        p->weight[i] *= sqrt(square(pulled / p->slip[i]) + 1.0);
+        if (!(p->angle[i] <= widest)) p->weight[i] *= 0.0;
     }
 }
 
@@ -67,15 +70,16 @@ static double weigh(const Calibration *cal, const SlidingCurve *c, const Seen *s
                     double along, Possible *p) {
     const Constants *k = &cal->constants;
     double surprise[POINTS], least = INFINITY, stiffer = curve_stiffer(c, k, s->load);
+    double of_moment = square(s->moment_std), of_pull = square(s->pull_std);
     double dry = used * pow(1.0 - p->t[POINTS - 1], c->fading);
     for (int i = 0; i < POINTS; i++) {
         /* a regression of one road shows a part only of what another takes from the moment */
         double aligned = used * pow(1.0 - p->t[i], c->fading), taken = s->unseen * (dry - aligned);
         double apart = s->moment - aligned - k->hidden * taken;
         double expected = used * along / p->slip[i], unsure = used * stiffer / p->slip[i];
-        double slanted = hypot(c->slant * expected, unsure * s->slip_std);
-        surprise[i] = surprise_of(apart, hypot(s->moment_std, k->hidden_doubt * taken));
-        surprise[i] += surprise_of(s->pull - expected, hypot(s->pull_std, slanted));
+        double slanted = square(c->slant * expected) + square(unsure * s->slip_std);
+        surprise[i] = surprise_of(apart, of_moment + square(k->hidden_doubt * taken));
+        surprise[i] += surprise_of(s->pull - expected, of_pull + slanted);
         least = minimum(least, surprise[i]);
     }
     for (int i = 0; i < POINTS; i++) p->weight[i] *= exp(least - surprise[i]);

@@ -57,6 +57,10 @@ static inline double *ring_seen(const Ring *ring, int64_t sample) {
 int ring_held(const Ring *ring, int condition);
 int ring_trigger(const Ring *ring);
 
+/* Return a column from one sample to before another: where it lies, if its samples follow one
+ * another, else copied to `room`. */
+const double *ring_look(const Ring *ring, int column, int64_t start, int64_t stop, double *room);
+
 /* Copy a column from one sample to before another; return how many samples these are. */
 size_t ring_column(const Ring *ring, int column, int64_t start, int64_t stop, double *out);
 

@@ -28,16 +28,18 @@ double curve_share(const SlidingCurve *c, const Constants *k, double used, doubl
                    double load, double along) {
     double n = c->sharpness, effective = c->grip * friction, across = used / effective;
     double pull = fabs(curve_cornering(c, k, load) * along) / (n * effective);
-    double alone = 1.0 - pow(maximum(1.0 - across, 0.0), 1.0 / n);
+    double alone = 1.0 - pow(maximum(1.0 - across, 0.0), 1.0 / n), before = NAN;
     double t = maximum(alone, minimum(pull, 1.0));
-    for (int i = 0; i < (int)k->newton; i++) {
+    if (!(pull > 0.0)) return alone;
+    for (int i = 0; i < (int)k->newton && t != before; i++) { /* one that stays, stays */
         double at = maximum(t, k->tiny), rest = pow(1.0 - at, n - 1.0);
         double filled = maximum(1.0 - rest * (1.0 - at), k->tiny);
         double a = pull / at * (pull / at), b = across / filled * (across / filled);
         double fall = 2.0 * (a / at + b * n * rest / filled);
+        before = t;
         t = minimum(t + maximum(a + b - 1.0, 0.0) / maximum(fall, k->tiny), 1.0);
     }
-    return pull > 0.0 ? t : alone;
+    return t;
 }
 
 double curve_across(const SlidingCurve *c, const Constants *k, double used, double t, double load) {

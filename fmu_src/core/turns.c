@@ -93,9 +93,9 @@ static int64_t kept_from(const Cutter *c, int64_t sample) {
 /* Course of a held condition over the samples that the law is found from. */
 static Course course_of(Cutter *c, int condition, int64_t first, int64_t stop, double middle,
                         double turn) {
-    size_t n = ring_column(&c->ring, ring_held(&c->ring, condition), kept_from(c, first), stop,
-                           c->scratch);
-    return course(c->scratch, n, (double)first - middle, turn);
+    int64_t kept = kept_from(c, first);
+    const double *x = ring_look(&c->ring, ring_held(&c->ring, condition), kept, stop, c->scratch);
+    return course(x, stop > kept ? (size_t)(stop - kept) : 0, (double)first - middle, turn);
 }
 
 /* Law of the wheel angle and the last sample that the turn needs. Reference: TurnCutter._needs */
@@ -123,13 +123,11 @@ static int damaged(const Cutter *c, const Contact *contact) {
     return gap_in(c, rise - NEAR_EDGE, rise + 2) || gap_in(c, fall - NEAR_EDGE, fall + 2);
 }
 
-/* Leave out what is missing; return how many numbers are left. */
-static size_t only_finite(double *x, size_t n) {
-    size_t count = 0, missing = 0;
-    for (size_t i = 0; i < n; i++) missing += !isfinite(x[i]);
-    if (!missing) return n;
+/* Copy what is not missing, be it to its own place; return how many numbers these are. */
+static size_t only_finite(double *out, const double *x, size_t n) {
+    size_t count = 0;
     for (size_t i = 0; i < n; i++)
-        if (isfinite(x[i])) x[count++] = x[i];
+        if (isfinite(x[i])) out[count++] = x[i];
     return count;
 }
 
@@ -149,8 +147,12 @@ static double mean_of(const Cutter *c, int column, double start, double stop, in
                       int *gap) {
     int64_t a = kept_from(c, whole(rint(start))), b = whole(rint(stop));
     if (b > c->ring.total) b = c->ring.total;
-    size_t n = ring_column(&c->ring, column, a, b, c->scratch), count = only_finite(c->scratch, n);
-    double needed = (1.0 - LARGEST_MISSING) * (double)n;
+    size_t n = b > a ? (size_t)(b - a) : 0;
+    const double *x = ring_look(&c->ring, column, a, b, c->scratch);
+    double sum = robust ? NAN : sum_of(x, n), needed = (1.0 - LARGEST_MISSING) * (double)n;
+    *gap = 0;
+    if (n > 0 && isfinite(sum)) return sum / (double)n; /* none is missing */
+    size_t count = only_finite(c->scratch, x, n);
     *gap = (double)count < (needed > 1.0 ? needed : 1.0);
     if (*gap) return NAN;
     return robust ? median(c->scratch, count) : sum_of(c->scratch, count) / (double)count;
@@ -393,7 +395,7 @@ int cutter_run(Cutter *c, const Column *columns, int64_t n, int64_t *taken, Turn
     int found = cutter_next(c, turn);
     while (!found && *taken < n) {
         if (!cutter_take(c, columns, (*taken)++)) return -1;
-        found = cutter_next(c, turn);
+        if (c->queued) found = cutter_next(c, turn);
     }
     return found;
 }

@@ -13,10 +13,10 @@ from tirelib.estimators.chain import Chain
 from tirelib.estimators.estimate import Estimate
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.unknowns import FRICTION, TWO_SIGMA
-from tirelib.features.extract import extract_features
+from tirelib.features import concatenate_features, extract_features
 from tirelib.fmu.virtual.spec import friction_surface
 from tirelib.fmu.virtual.surface import read_surface
-from tirelib.observations import TRUTH, Observations, concatenate_features
+from tirelib.observations import TRUTH, Observations
 from tirelib.signal import cut_turns
 
 RATE, SPEED, PRESSURE, DRY = 1e4, 65.0 / 3.6, 2.3e5, 0.95

@@ -18,7 +18,13 @@ from tirelib.core import Core, loaded_core
 from tirelib.errors import FormatError, ParameterError, ShapeError
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.compiled import core_calibration
-from tirelib.features import Features, extract_features, features_of_record
+from tirelib.features import (
+    Features,
+    RecordReader,
+    concatenate_features,
+    extract_features,
+    features_of_record,
+)
 from tirelib.features.extract import reference_features
 from tirelib.held import HELD
 from tirelib.signal import TurnCutter, Turns, cut_turns, stack_turns
@@ -95,6 +101,22 @@ def test_more_turns_than_a_block_and_no_turn_at_all() -> None:
         assert len(none) == 0
         assert none.lead.shape == (0, 5)
         assert len(live.calibration().estimate(none).notes) == 0
+
+
+def test_records_one_after_the_other_have_the_features_of_each_alone() -> None:
+    strain = live.strain_of(4e3, 0.05, turns=70.4)[0]
+    records = [(strain, live.RATE)] * 5  # more turns than the core writes side by side
+    records[2:2] = [(strain[:, :1000], 2e6), (strain[:, :60], live.RATE)]  # one too fast, one empty
+    reader, parts = RecordReader(LATERAL), []
+    for number, (samples, rate) in enumerate(records):
+        alone = features_of_record(samples, rate, LATERAL, speed=live.SPEED)
+        time, omega = reader.add(samples, rate, start=float(number), speed=live.SPEED)
+        shifted = replace(alone, time=alone.time + number, ready=alone.ready + number)
+        np.testing.assert_array_equal(time, shifted.time)
+        np.testing.assert_array_equal(omega, shifted.omega)
+        parts.append(shifted)
+    assert len(reader.features()) == 5 * 70 + 2
+    assert_alike(reader.features(), concatenate_features(parts))
 
 
 def test_strain_may_lie_in_memory_in_any_way() -> None:

@@ -32,7 +32,14 @@ def conditions_of(run: Run, times: FloatArray) -> dict[str, FloatArray]:
     dict of arrays, shape (n,), SI, ISO
         By the names of `HELD`, all of them; NaN where unknown.
     """
-    return {name: _held(run, name, times) for name in HELD}
+    held = run.hold_all(HELD, times)
+    if held and run.rig_time is not None:
+        after = times > _end(run.rig_time)
+        for values in held.values():
+            values[after] = np.nan
+    for name in (name for name in HELD if name not in held):
+        held[name] = np.full(times.shape, float(getattr(run.plan, name, np.nan)))
+    return {name: held[name] for name in HELD}
 
 
 def changes_of(run: Run) -> FloatArray:
@@ -42,13 +49,6 @@ def changes_of(run: Run) -> FloatArray:
     end = np.nextafter(_end(run.rig_time), np.inf)
     times = np.array([run.start_time, *run.rig_time, end])
     return np.unique(np.maximum(times[np.isfinite(times)], run.start_time))
-
-
-def _held(run: Run, name: str, times: FloatArray) -> FloatArray:
-    values = run.hold(name, times)
-    if values is None or run.rig_time is None:
-        return np.full(times.shape, float(getattr(run.plan, name, np.nan)))
-    return np.where(times > _end(run.rig_time), np.nan, values)
 
 
 def _end(rig_time: FloatArray) -> float:

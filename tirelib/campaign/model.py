@@ -1,6 +1,6 @@
 """Content of a campaign: tire, gages, plan and runs. Everything here is SI, radians and ISO."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -173,14 +173,20 @@ class Run:
         ShapeError
             If the run has this quantity but not as many times.
         """
-        samples = self.rig.get(quantity)
-        if samples is None or samples.size == 0:
-            return None
-        if self.rig_time is None or self.rig_time.shape != samples.shape:
-            given = None if self.rig_time is None else self.rig_time.shape
-            raise ShapeError(
-                f"run {self.plan.run}: {quantity} has shape {samples.shape} but rig_time has "
-                f"{given}; both need the same; give every rig sample its time"
-            )
-        newest = np.searchsorted(self.rig_time, times + CLOCK_TOLERANCE, side="right") - 1
-        return np.where(newest < 0, np.nan, samples[np.maximum(newest, 0)])
+        return self.hold_all((quantity,), times).get(quantity)
+
+    def hold_all(self, quantities: Iterable[str], times: FloatArray) -> dict[str, FloatArray]:
+        """Return several rig quantities as `hold` does; one that was not recorded is left out."""
+        recorded = {name: self.rig[name] for name in quantities if name in self.rig}
+        recorded = {name: samples for name, samples in recorded.items() if samples.size}
+        for name, samples in recorded.items():
+            if self.rig_time is None or self.rig_time.shape != samples.shape:
+                given = None if self.rig_time is None else self.rig_time.shape
+                raise ShapeError(
+                    f"run {self.plan.run}: {name} has shape {samples.shape} but rig_time has "
+                    f"{given}; both need the same; give every rig sample its time"
+                )
+        if not recorded or self.rig_time is None:
+            return {}
+        newest = np.searchsorted(self.rig_time, times + CLOCK_TOLERANCE, side="right")
+        return {name: np.append(np.nan, samples)[newest] for name, samples in recorded.items()}

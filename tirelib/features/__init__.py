@@ -1,5 +1,12 @@
 """Features of each turn and gage: edges, peaks, integrals, symmetry."""
 
-from tirelib.features.extract import Features, extract_features, features_of_record
+from tirelib.features.extract import Features, extract_features
+from tirelib.features.records import RecordReader, concatenate_features, features_of_record
 
-__all__ = ["Features", "extract_features", "features_of_record"]
+__all__ = [
+    "Features",
+    "RecordReader",
+    "concatenate_features",
+    "extract_features",
+    "features_of_record",
+]

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core import (
     FEATURE_ROWS,
     GAGES,
@@ -15,10 +15,16 @@ from tirelib.core import (
     HeadStruct,
     TurnStruct,
     block_of,
+    memory,
     reals_of,
 )
+from tirelib.held import Held
 from tirelib.signal.compiled import BLOCK, Record
+from tirelib.signal.lowpass import LowPass
 from tirelib.signal.turn import Turns
+
+ROOM = 256
+"""Turns of which the core writes heads and features side by side."""
 
 
 def read_by_core(core: Core, turns: Turns) -> tuple[dict[str, FloatArray], IntArray, IntArray]:
@@ -45,17 +51,76 @@ def read_by_core(core: Core, turns: Turns) -> tuple[dict[str, FloatArray], IntAr
     return feature_columns(found, gages)
 
 
-def record_by_core(core: Core, record: Record, gages: int) -> dict[str, Any]:
-    """Return the attributes of `Features` of a record's turns, without keeping their curves."""
-    turn, heads = block_of(TurnStruct, 1), block_of(HeadStruct, BLOCK)
-    found = block_of(FeatureStruct, BLOCK)
-    parts: list[dict[str, Any]] = []
-    places = turn.ctypes.data, heads.ctypes.data, found.ctypes.data
-    for n in record.blocks(core.cut_features, *places):
-        parts.append(attributes_of(heads[:n], found[:n], gages))
-    if len(parts) == 1:
-        return parts[0]
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+class CompiledRecords:
+    """Features of the turns of records, one after the other, without keeping the curves.
+
+    Parameters
+    ----------
+    core : Core
+    lateral : array, shape (n_gages,), [m]
+    """
+
+    def __init__(self, core: Core, lateral: FloatArray) -> None:
+        self._core, self._lateral = core, lateral
+        self._turn, self._room = block_of(TurnStruct, 1), memory(0)
+        self._parts: list[dict[str, Any]] = []
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin with empty blocks of heads and features."""
+        self._heads, self._found = block_of(HeadStruct, ROOM), block_of(FeatureStruct, ROOM)
+        blocks = (self._turn, self._heads, self._found)
+        self._places = [(block.ctypes.data, block.itemsize) for block in blocks]
+        self._used = 0
+
+    def fits(self, rate: float) -> bool:
+        """Tell whether the core cuts records of these gages at a sample rate [Hz]."""
+        size = self._core.cutter_size(self._lateral.size, rate)
+        if size > self._room.nbytes:
+            self._room = memory(size)
+        return bool(size)
+
+    def add(
+        self,
+        strain: FloatArray,
+        rate: float,
+        low_pass: LowPass,
+        held: Held,
+        trigger: BoolArray | None,
+        start: float,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Take a record, as `tirelib.features.RecordReader.add` does, at a rate that fits."""
+        record = Record(
+            self._core, self._room, strain, self._lateral, rate, low_pass, held, trigger
+        )
+        contacts, found = [], BLOCK
+        while found == BLOCK:
+            if self._used + BLOCK > ROOM:
+                self._close()
+            (turn, _), *places = self._places
+            at = [place + self._used * size for place, size in places]
+            found = record.cut(self._core.cut_features, turn, *at)
+            heads = self._heads[self._used : self._used + found]
+            heads["time"] += start
+            heads["ready"] += start
+            contacts.append((heads["time"], heads["omega"]))
+            self._used += found
+        time, omega = (np.concatenate(parts) for parts in zip(*contacts, strict=True))
+        return time, omega
+
+    def _close(self) -> None:
+        """Read what is in the blocks, and begin new ones."""
+        heads, found = self._heads[: self._used], self._found[: self._used]
+        self._parts.append(attributes_of(heads, found, self._lateral.size))
+        self._begin()
+
+    def take(self) -> dict[str, Any]:
+        """Return the attributes of `Features` of the records since the last time."""
+        self._close()
+        parts, self._parts = self._parts, []
+        if len(parts) == 1:
+            return parts[0]
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def attributes_of(turns: Any, features: Any, gages: int) -> dict[str, Any]:

@@ -15,22 +15,18 @@ its middle:
           E_{friction} = l \int_0^{l/2} |\varepsilon_{fri}|\,d\xi
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Unpack
 
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core import GAGES, loaded_core
-from tirelib.features.compiled import read_by_core, record_by_core
+from tirelib.features.compiled import read_by_core
 from tirelib.features.peaks import peak
 from tirelib.flags import TurnFlag
-from tirelib.held import Held
-from tirelib.signal.compiled import Record
-from tirelib.signal.lowpass import LowPass
 from tirelib.signal.turn import PHI
-from tirelib.signal.turns import AFTER, Turns, check_gages, cut_turns
+from tirelib.signal.turns import AFTER, Turns
 
 EDGE_REACH = 0.35
 """How far outside the centre gage's pulse a leading edge is looked for, [rad]."""
@@ -142,28 +138,6 @@ def extract_features(turns: Turns) -> Features:
         return reference_features(turns)
     read, gage_flags, flags = read_by_core(core, turns)
     return features_of(turns, read, gage_flags, flags)
-
-
-def features_of_record(
-    strain: FloatArray,
-    rate: float,
-    lateral: Sequence[float],
-    *,
-    trigger: BoolArray | None = None,
-    low_pass: LowPass | None = None,
-    **held: Unpack[Held],
-) -> Features:
-    """Return the features of a whole record: `extract_features` of `cut_turns`, in one go.
-
-    Parameters and errors are those of `tirelib.signal.cut_turns`.
-    """
-    core, places = loaded_core(), np.asarray(lateral, dtype=np.float64)
-    if core is None or not core.cutter_size(places.size, rate):
-        turns = cut_turns(strain, rate, lateral, trigger=trigger, low_pass=low_pass, **held)
-        return extract_features(turns)
-    check_gages(strain, places.size)
-    record = Record(core, strain, places, rate, low_pass or LowPass(), held, trigger)
-    return Features(lateral=places, **record_by_core(core, record, places.size))
 
 
 def reference_features(turns: Turns) -> Features:

@@ -248,7 +248,7 @@ def play_campaign(
             values["plan"] = run.plan
         features = _features(found, fmu.calibration)
         for name in TRUTH:
-            truth[name].append(truth_of(run, name, features))
+            truth[name].append(truth_of(run, name, features.time, features.omega))
         rows += found
         if progress is not None:
             progress(f"{header.name} run {run.plan.run}")

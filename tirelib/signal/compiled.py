@@ -1,7 +1,6 @@
 """Turns cut by the compiled core, see `tirelib.core`."""
 
 import ctypes as c
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from tirelib.core import (
     TurnStruct,
     block_of,
     columns_of,
-    memory,
 )
 from tirelib.errors import ParameterError
 from tirelib.held import HELD, Held
@@ -27,11 +25,15 @@ BLOCK = 32
 
 
 class Record:
-    """A whole record in the core; parameters as in `tirelib.signal.cut_turns`."""
+    """A whole record in the core; parameters as in `tirelib.signal.cut_turns`.
+
+    `room` is memory of ``core.cutter_size`` bytes, which is the record's as long as it is cut.
+    """
 
     def __init__(
         self,
         core: Core,
+        room: FloatArray,
         strain: FloatArray,
         lateral: FloatArray,
         rate: float,
@@ -41,9 +43,9 @@ class Record:
     ) -> None:
         self._columns, self._kept = columns_of(strain, dict(held), HELD, trigger)
         self._positions = np.ascontiguousarray(lateral, dtype=np.float64)
-        self._memory = memory(core.cutter_size(lateral.size, rate))
+        self._memory = room
         self._cutter = core.cutter_start(
-            self._memory.ctypes.data,
+            room.ctypes.data,
             lateral.size,
             self._positions.ctypes.data,
             rate,
@@ -51,29 +53,28 @@ class Record:
         )
         self._size, self._taken = strain.shape[1], c.c_int64(0)
 
-    def blocks(self, function: Any, *arguments: int) -> Iterator[int]:
-        """Yield how many turns a cutting function of the core gives at a time.
+    def cut(self, function: Any, *arguments: int) -> int:
+        """Return how many turns a cutting function of the core gives: fewer than BLOCK at the end.
 
         Raises
         ------
         ParameterError
             If the filter would reach beyond the samples.
         """
-        found = BLOCK
-        while found == BLOCK:
-            taken = c.byref(self._taken)
-            found = function(self._cutter, self._columns, self._size, taken, *arguments, BLOCK)
-            if found < 0:
-                raise beyond_samples(self._taken.value)
-            yield found
+        taken = c.byref(self._taken)
+        found = int(function(self._cutter, self._columns, self._size, taken, *arguments, BLOCK))
+        if found < 0:
+            raise beyond_samples(self._taken.value)
+        return found
 
 
 def cut_by_core(core: Core, record: Record, lateral: FloatArray, rate: float) -> Turns:
     """Return the turns of a record."""
     block = block_of(TurnStruct, BLOCK)
-    parts = [
-        turn_columns(block[:n], lateral.size) for n in record.blocks(core.cut, block.ctypes.data)
-    ]
+    parts, found = [], BLOCK
+    while found == BLOCK:
+        found = record.cut(core.cut, block.ctypes.data)
+        parts.append(turn_columns(block[:found], lateral.size))
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return turns_of(columns, lateral, rate)
 

@@ -21,7 +21,7 @@ from typing import Unpack
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.core import loaded_core
+from tirelib.core import loaded_core, memory
 from tirelib.errors import ParameterError, ShapeError
 from tirelib.flags import TurnFlag
 from tirelib.held import HELD, Held
@@ -489,9 +489,11 @@ def cut_turns(
         If the rate is not above zero, or the filter would reach beyond the samples.
     """
     core, places = loaded_core(), np.asarray(lateral, dtype=np.float64)
-    if core is None or not core.cutter_size(places.size, rate):
+    size = core.cutter_size(places.size, rate) if core else 0
+    if core is None or not size:
         turns = TurnCutter(lateral, rate, low_pass).push(strain, trigger=trigger, **held)
         return stack_turns(turns, places, rate)
     check_gages(strain, places.size)
-    record = Record(core, strain, places, rate, low_pass or LowPass(), held, trigger)
+    room = memory(size)
+    record = Record(core, room, strain, places, rate, low_pass or LowPass(), held, trigger)
     return cut_by_core(core, record, places, rate)

@@ -8,11 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.synthetic import LATERAL, RATE, record
-from tirelib.features import Features, extract_features
+from tirelib.features import Features, concatenate_features, extract_features
 from tirelib.features.peaks import peak
 from tirelib.features.table import feature_frame, rate_slope, units
 from tirelib.flags import TurnFlag
-from tirelib.observations import concatenate_features
 from tirelib.signal import cut_turns
 
 
