@@ -1,7 +1,8 @@
 """Laws of the line of samples: time goes on, losses are counted, nothing is invented."""
 
+import pickle
 from collections import deque
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import chain, pairwise
 
 import numpy as np
@@ -227,3 +228,16 @@ def test_a_clock_that_agrees_is_taken_whatever_else_happens(
     timeline = Timeline(Device())
     timeline.push(replace(frames, t_us=frames.t_us + jump * after, seq=seq))
     assert not timeline.contradiction
+
+
+def test_samples_come_out_of_another_process_as_they_went_in() -> None:
+    strain = np.arange(6.0).reshape(3, 2)
+    strain[1] = np.nan
+    lost, saturated = np.isnan(strain[:, 0]), strain > 4.0
+    for n in (3, 0):
+        sent = Samples(2, "gap", 7, 5, 1e-4, strain[:n], lost[:n], saturated[:n])
+        got = pickle.loads(pickle.dumps(sent, 5))
+        for field in fields(Samples):
+            one, other = getattr(got, field.name), getattr(sent, field.name)
+            np.testing.assert_array_equal(one, other, strict=True)
+        assert pickle.dumps(got, 5) == pickle.dumps(sent, 5)  # a reader compares them

@@ -1,6 +1,7 @@
 """``tirelib fmu``: the estimator as an FMU; build it, check it, play a campaign to it."""
 
 import math
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -191,7 +192,7 @@ def build(
     free = f"of any length, up to {samples_per_step} samples"
     console.print(f"communication step {free if buffered else f'{step:g} ms'}")
     console.print(f"written: {path} ({path.stat().st_size / 1e3:.0f} kB)")
-    console.print(f"next: tirelib fmu check {path}")
+    console.print(f"next: {shlex.join(['tirelib', 'fmu', 'check', str(path)])}")
 
 
 @fmu.command(epilog=_TABLE)

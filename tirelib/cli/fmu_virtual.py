@@ -1,5 +1,6 @@
 """``tirelib fmu virtual``: a tire with strain gages as an FMU, for any vehicle model."""
 
+import shlex
 from pathlib import Path
 
 import click
@@ -86,4 +87,4 @@ def virtual(
     console = output()
     console.print(f"communication step up to {1e3 * samples_per_step / sample_rate:g} ms")
     console.print(f"written: {path} ({path.stat().st_size / 1e3:.0f} kB)")
-    console.print(f"next: tirelib fmu check {path}")
+    console.print(f"next: {shlex.join(['tirelib', 'fmu', 'check', str(path)])}")

@@ -104,17 +104,16 @@ def embedded_calibration(fmu: str | Path) -> Calibration:
     """
     try:
         with zipfile.ZipFile(fmu) as archive:
-            if _sealed(archive):
-                raise FormatError(
-                    f"{fmu}: is sealed, so it holds no calibration file; one built without "
-                    "--sealed is needed; step this one in any importer, or check it with "
-                    "`tirelib fmu check`"
-                )
-            return _read(archive.read(f"resources/{CALIBRATION}"))
+            if not _sealed(archive):
+                return _read(archive.read(f"resources/{CALIBRATION}"))
     except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
         raise FormatError(
             f"{fmu}: is not an FMU made by `tirelib fmu build` ({error}); build it again"
         ) from None
+    raise FormatError(
+        f"{fmu}: is sealed, so it holds no calibration file; one built without --sealed is needed; "
+        "step this one in any importer, or check it with `tirelib fmu check`"
+    )
 
 
 @lru_cache(maxsize=2)

@@ -244,7 +244,8 @@ class WheelChain:
         segment = self._segment
         if segment is None or not len(block.strain):
             return []
-        strain, marks = block.strain, np.column_stack((block.saturated, block.lost))
+        strain, marks = block.strain, np.empty((len(block.lost), segment.gages + 1), np.bool_)
+        marks[:, :-1], marks[:, -1] = block.saturated, block.lost  # 600 times a second
         if len(segment.waiting):
             strain = np.concatenate((segment.waiting, strain))
             marks = np.concatenate((segment.marks, marks))
@@ -272,7 +273,7 @@ class WheelChain:
         return size if left >= size else max(1, math.ceil(left))
 
     def _step(self, segment: _Segment, strain: FloatArray) -> Turn | None:
-        valid = not np.isnan(strain).all()
+        valid = bool(strain[0, 0] == strain[0, 0]) or not np.isnan(strain).all()
         result = self._estimator.step(strain, segment.condition, valid)
         segment.stepped += len(strain)
         self.steps += 1

@@ -8,6 +8,7 @@ whatever follows must forget what came before. What comes again or late is dropp
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import zip_longest
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -107,6 +108,36 @@ class Samples:
     def end_us(self) -> int:
         """Device time of the sample that follows, [us]."""
         return self.t_us + round(1e6 * self.period * len(self.strain))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Go from process to process as bytes, which takes a third of the time of arrays."""
+        head = (self.segment, self.reset, self.start, self.t_us, self.period)
+        arrays = (array.tobytes() for array in (self.strain, self.lost, self.saturated))
+        return _from_bytes, (*head, self.strain.shape[1], *arrays)
+
+
+def _from_bytes(
+    segment: int,
+    reset: str,
+    start: int,
+    t_us: int,
+    period: float,
+    gages: int,
+    strain: bytes,
+    lost: bytes,
+    saturated: bytes,
+) -> Samples:
+    """Return samples of which `Samples.__reduce__` made bytes; their arrays are read-only."""
+    return Samples(
+        segment,
+        reset,
+        start,
+        t_us,
+        period,
+        np.frombuffer(strain).reshape(-1, gages),
+        np.frombuffer(lost, np.bool_),
+        np.frombuffer(saturated, np.bool_).reshape(-1, gages),
+    )
 
 
 class Timeline:
