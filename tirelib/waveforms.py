@@ -5,7 +5,7 @@ filtered as everywhere (`LowPass`), over the wheel angle from the trigger, free 
 turn (which holds the gage's zero and the hoop strain of inflation and speed).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -118,9 +118,19 @@ def measure_waveforms(
     campaign: Campaign,
     *,
     low_pass: LowPass | None = None,
+    runs: Iterable[Run] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Waveforms:
     """Read the waveforms of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    low_pass : LowPass, optional
+    runs : iterable of Run, optional
+        The campaign's, where somebody else looks at each of them too; so they are read once.
+    progress : callable, optional
+        Called with a label after each run.
 
     Raises
     ------
@@ -130,7 +140,7 @@ def measure_waveforms(
     chosen = low_pass or LowPass()
     rows: list[_Row] = []
     left_out: dict[int, str] = {}
-    for run in campaign.runs():
+    for run in campaign.runs() if runs is None else runs:
         row = _measure(run, campaign.header, chosen)
         if isinstance(row, str):
             left_out[run.plan.run] = row

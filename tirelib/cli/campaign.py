@@ -1,6 +1,7 @@
 """``tirelib campaign``: checks a folder of measurements, and shows its content."""
 
 import json
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +12,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from tirelib.campaign.model import Run
 from tirelib.campaign.problem import Problem
 from tirelib.campaign.read import Campaign, read_campaign
 from tirelib.cli.common import NEW_FILE, NEW_FOLDER
@@ -127,6 +129,7 @@ Examples:
     type=NEW_FOLDER,
     help="Folder for the overview plot. Default: show-NAME.",
 )
+@click.option("--no-plot", "no_plot", is_flag=True, help="Draw no overview plot: faster.")
 @click.option(
     "--data",
     "data_file",
@@ -136,39 +139,50 @@ Examples:
 )
 @json_option("header and runs")
 @progress_options
-def show(folder: Path, out: Path | None, data_file: Path | None, json_file: Path | None) -> None:
+def show(
+    folder: Path, out: Path | None, no_plot: bool, data_file: Path | None, json_file: Path | None
+) -> None:
     """Show header, runs with set points and measured means, and an overview plot of DIR."""
     from tirelib.campaign.overview import RunRow, representative_plans, run_row
-    from tirelib.report.campaign_overview import overview_figure, save_figure
 
     data = read_campaign(folder)
-    if data_file is not None:
-        _write_measured(data, data_file)
-    chosen = {plan.run for plan in representative_plans(data.plans)}
+    chosen = set() if no_plot else {plan.run for plan in representative_plans(data.plans)}
     rows: list[RunRow] = []
-    shown = []
+    drawn: list[Run] = []
     with _progress("reading") as progress:
-        for done, run in enumerate(data.runs(), start=1):
-            rows.append(run_row(run))
-            shown += [run] if run.plan.run in chosen else []
-            progress(done, len(data.plans))
+
+        def seen() -> Iterator[Run]:
+            for done, run in enumerate(data.runs(), start=1):
+                rows.append(run_row(run))
+                drawn.extend([run] if run.plan.run in chosen else [])
+                progress(done, len(data.plans))
+                yield run
+
+        if data_file is not None:
+            _write_measured(data, seen(), data_file)
+        if not rows:
+            deque(seen(), maxlen=0)
     terminal = Console(highlight=False)
     console = terminal if terminal.is_terminal else Console(highlight=False, width=_WIDE)
     _print_header(console, data)
     _print_runs(console, data, rows)
-    target = out or Path(f"show-{folder.resolve().name}")
-    picture = save_figure(overview_figure(data.header, rows, shown), target / "overview.png")
+    picture = None
+    if not no_plot:
+        from tirelib.report.campaign_overview import overview_figure, save_figure
+
+        target = out or Path(f"show-{folder.resolve().name}")
+        picture = save_figure(overview_figure(data.header, rows, drawn), target / "overview.png")
+        console.print(f"overview plot: {picture}", markup=False, soft_wrap=True)
     if json_file is not None:
         _write_json(json_file, _show_document(data, rows, picture))
-    console.print(f"overview plot: {picture}", markup=False, soft_wrap=True)
 
 
-def _write_measured(data: Campaign, file: Path) -> None:
+def _write_measured(data: Campaign, runs: Iterator[Run], file: Path) -> None:
     """Write what was measured, or say why there is nothing to be drawn."""
     from tirelib.compare.plot_data import measured_data, write_plot_data
 
     try:
-        write_plot_data(file, measured_data(data))
+        write_plot_data(file, measured_data(data, runs))
     except CalibrationError as error:
         click.echo(f"Warning: {file} is not written: {error}", err=True)
 
@@ -205,7 +219,7 @@ def _print_runs(console: Console, data: Campaign, rows: list[Any]) -> None:
     console.print(table)
 
 
-def _show_document(data: Campaign, rows: list[Any], picture: Path) -> dict[str, Any]:
+def _show_document(data: Campaign, rows: list[Any], picture: Path | None) -> dict[str, Any]:
     from tirelib.campaign.overview import header_document, row_document
 
     return {
@@ -215,7 +229,7 @@ def _show_document(data: Campaign, rows: list[Any], picture: Path) -> dict[str, 
         "header": header_document(data.header),
         "content_hash": data.content_hash(),
         "runs": [row_document(row) for row in rows],
-        "plot": str(picture),
+        "plot": None if picture is None else str(picture),
     }
 
 

@@ -1,5 +1,6 @@
 """``tirelib identify``: the tire's parameters from a campaign, with intervals and flags."""
 
+import os
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from tirelib.parameters import TireFile
 
 BASES = ("plain", "dissertation")
+GIVES_WAY = 10
+"""By how much an identification gives way to those who work with its first ring (`os.nice`): one of
+them beside it on one processor has nine tenths of it."""
 
 _EXAMPLE = """\b
 Examples:
@@ -93,6 +97,8 @@ def identify(
             new = first.with_name(f".{first.name}.new")
             write_tire(ring, new, "tirelib-model/1")
             new.replace(first)  # whoever waits for it never reads a part
+            if hasattr(os, "nice"):
+                os.nice(GIVES_WAY)
 
     with progress_bar("identifying") as progress:
         whole = identify_whole(campaign, start, base=base, progress=progress, found=found)

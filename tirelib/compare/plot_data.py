@@ -8,14 +8,14 @@ delay of the gages and the set points could take up, with the sign turned. It is
 these, so it shows the shape; how much an effect really takes away is told by an exact refit.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tirelib.arrays import FloatArray
-from tirelib.campaign import Campaign
+from tirelib.campaign import Campaign, Run
 from tirelib.compare.force_curves import set_point_levels
 from tirelib.compare.force_model import force_model_of
 from tirelib.compare.forces import ForceComparison, usable_points
@@ -89,10 +89,13 @@ def plot_data(
             f"--trace {unknown[0]}: the effect is not known; known are {', '.join(effects)}; "
             "correct the name, or load the file that defines it with --effects"
         )
+    data = _forces(found) if isinstance(found, ForceComparison) else _strain(found)
+    if not planted:
+        return data
     if isinstance(found, ForceComparison):
-        data, trace = _forces(found), _force_traces(found, campaign, file, effects)
+        trace = _force_traces(found, campaign, file, effects)
     else:
-        data, trace = _strain(found), _strain_traces(found)
+        trace = _strain_traces(found)
     for name, strength in planted:
         if progress is not None:
             progress(f"trace of {name}")
@@ -103,12 +106,15 @@ def plot_data(
     return data
 
 
-def measured_data(campaign: Campaign) -> dict[str, Any]:
+def measured_data(campaign: Campaign, runs: Iterable[Run] | None = None) -> dict[str, Any]:
     """Return what was measured, as `plot_data` does without a model's arrays.
 
     Parameters
     ----------
     campaign : Campaign
+    runs : iterable of Run, optional
+        The campaign's, where somebody else looks at each of them too; forces are read by
+        themselves.
 
     Returns
     -------
@@ -121,7 +127,7 @@ def measured_data(campaign: Campaign) -> dict[str, Any]:
         If no run holds a waveform of strain, or of a campaign without gages a force over slip.
     """
     if campaign.header.gage_lateral:
-        return _runs(choose(measure_waveforms(campaign)))
+        return _runs(choose(measure_waveforms(campaign, runs=runs)))
     points = force_points(force_data(campaign)).data
     for name in FORCES:
         known = points.take(np.isfinite(getattr(points, name)))

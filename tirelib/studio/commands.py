@@ -114,7 +114,7 @@ KINDS: Mapping[str, Kind] = {
         "read the runs",
         lambda o, out: [
             *("campaign", "show", o["campaign"], "--json", f"{out}/show.json"),
-            *("--out", f"{out}/overview", "--data", f"{out}/measured.npz"),
+            *("--no-plot", "--data", f"{out}/measured.npz"),
         ],
         ("show.json",),
     ),
@@ -197,6 +197,12 @@ KINDS: Mapping[str, Kind] = {
     ),
 }
 """Every kind of job by name."""
+
+
+def planted(effect: str, strength: float | Sequence[float]) -> str:
+    """Return an effect of a strength as `--trace` takes it."""
+    numbers = [strength] if isinstance(strength, int | float) else strength
+    return f"{effect}=" + ",".join(repr(float(x)) for x in numbers)
 
 
 def told(words: Sequence[str]) -> str:

@@ -1,6 +1,5 @@
 """What the user asks for, and what follows from a job that has ended."""
 
-import json
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -8,8 +7,8 @@ from typing import Any
 
 from tirelib.errors import ParameterError
 from tirelib.studio import intake
-from tirelib.studio.commands import FIRST
-from tirelib.studio.disk import read_document, write_atomic
+from tirelib.studio.commands import FIRST, planted
+from tirelib.studio.disk import move_into, read_document, write_document
 from tirelib.studio.jobs import Job, Jobs
 from tirelib.studio.receiving import Receiving
 from tirelib.studio.session import QUANTITIES, Model, Opened, Session
@@ -38,6 +37,7 @@ class Desk:
 
     def __init__(self, session: Session, jobs: Jobs, roots: Sequence[Path]) -> None:
         self.session, self.jobs = session, jobs
+        self._early: list[Job] = []
         self.roots = [root.expanduser().resolve() for root in roots]
         known = [*self.roots, session.folder.resolve()]
         self.receiving = Receiving(
@@ -106,19 +106,22 @@ class Desk:
         """Put results in their place, and begin what comes next."""
         if job.state != "done":
             return
+        if job.kind == "identify" and self._unchecked(job):
+            self._early.append(job)
+            return
         out, subject = self.jobs.out(job), job.subject
         if job.kind in ("rig", "import"):
             opened = self.session.open(out / "campaign", "example" if job.kind == "rig" else "")
             self._begin(opened)
         elif job.kind in ("catalogue", "effects"):
-            _move(out, self.session.folder)
+            move_into(self.session.folder, out)
             for path in job.order.get("effect_files", ())[-1:]:
                 told = read_document(Path(path).with_suffix(".json")) or {}
                 write_document(Path(path).with_suffix(".json"), told | {"confirmed": True})
                 self._diagnose_anew()
         elif job.kind in OF_CAMPAIGN:
             opened = self.session.campaign(subject["campaign"])
-            _move(out, opened.place)
+            move_into(opened.place, out)
             if job.kind == "check":
                 self._checked(opened)
             else:
@@ -132,7 +135,7 @@ class Desk:
         elif job.kind in OF_MODEL:
             opened = self.session.campaign(subject["campaign"])
             model = opened.model(subject["model"])
-            _move(out, model.place)
+            move_into(model.place, out)
             quantity = subject.get("quantity") or self._quantity(opened, model)
             opened.change(current=model.number, quantity=quantity)
             if then := job.order.get("then"):
@@ -144,20 +147,27 @@ class Desk:
             model = opened.model(subject["model"])
             if job.kind == "diagnose":
                 model.document("traces.npz", subject["quantity"]).unlink(missing_ok=True)
-            _move(out, model.place / subject["quantity"])
+            move_into(model.place / subject["quantity"], out)
             self._computed(opened, model, subject["quantity"])
         elif job.kind in TAKEN:
             opened = self.session.campaign(subject["campaign"])
             place = opened.model(subject["model"]).place / "taken"
-            _move(out, place)
+            move_into(place, out)
             if job.kind == "calibrate":
                 self.jobs.add("fmu", {"calibration": str(place / "CAL.toml")}, subject)
+
+    def released(self) -> list[Job]:
+        """Return the base fits that ended before the check of their campaign, which is over now."""
+        ready = [job for job in self._early if not self._unchecked(job)]
+        self._early = [job for job in self._early if job not in ready]
+        return ready
 
     def first_fits(self) -> bool:
         """Compare each ring that has just been fitted; return whether there is one."""
         found = False
         for job in list(self.jobs.all.values()):
-            if job.state != "running" or not (first := self.jobs.out(job) / FIRST).exists():
+            first = self.jobs.out(job) / FIRST
+            if job.state != "running" or not first.exists() or self._unchecked(job):
                 continue
             opened = self.session.campaign(job.subject["campaign"])
             model = opened.model(job.subject["model"])
@@ -170,8 +180,10 @@ class Desk:
         return found
 
     def _begin(self, opened: Opened) -> Opened:
-        """Check a campaign that was opened, and read its runs: they may have changed."""
+        """Check a campaign that was opened, read its runs, and fit a first base model meanwhile."""
         subject = {"campaign": opened.name}
+        if not any(model.ready for model in opened.models):
+            self._identify(opened)
         for kind in OF_CAMPAIGN:
             if not self._under_way(kind, subject):
                 self.jobs.add(kind, {"campaign": opened.folder}, subject)
@@ -181,19 +193,32 @@ class Desk:
         every = self.jobs.all.values()
         return [j for j in every if j.kind == kind and j.subject == dict(subject) and not j.over]
 
+    def _unchecked(self, fit: Job) -> bool:
+        return bool(self._under_way("check", {"campaign": fit.subject["campaign"]}))
+
+    def _fits(self, opened: Opened) -> list[Job]:
+        """Return the base fits of a campaign that go on, or whose results wait for the check."""
+        jobs = self.jobs.all.values()
+        fits = [j for j in jobs if j.kind == "identify" and j.subject["campaign"] == opened.name]
+        return [job for job in fits if not job.over or job in self._early]
+
     def _checked(self, opened: Opened) -> None:
-        """Fit the base model of a campaign that is sound."""
+        """End the base fit of a campaign with errors; of any other, compute what is not known."""
         told = read_document(opened.place / "check.json") or {}
         if told.get("errors"):
+            for job in (fits := self._fits(opened)):
+                self.jobs.cancel(job)
+            self._early = [job for job in self._early if job not in fits]
             return
-        if not opened.models:
-            self._identify(opened)
         for model in opened.models:
             if model.number == opened.told.get("current"):
                 self._computed(opened, model, self._quantity(opened, model))
 
     def _identify(self, opened: Opened) -> None:
-        model = opened.new_model(None, "identify", "", "")
+        if self._fits(opened):
+            return
+        left = [m for m in opened.models if not m.ready and m.told["action"] == "identify"]
+        model = left[0] if left else opened.new_model(None, "identify", "", "")
         subject = {"campaign": opened.name, "model": model.number}
         self.jobs.add("identify", {"campaign": opened.folder, "first": True}, subject)
 
@@ -228,7 +253,7 @@ class Desk:
             self._once("diagnose", about, subject)
             return
         told = read_document(model.document("diagnosis.json", quantity)) or {}
-        wanted = [_trace(e["effect"], e["strength"]) for e in told.get("candidates", [])]
+        wanted = [planted(e["effect"], e["strength"]) for e in told.get("candidates", [])]
         if wanted and not model.document("traces.npz", quantity).exists():
             self._once("traces", about | {"traces": wanted}, subject)
 
@@ -346,7 +371,7 @@ class Desk:
         opened, model, quantity = self._model(wish)
         numbers = [float(x) for x in wish.get("strength", ())]
         about = self._about(opened, model, quantity)
-        traces = [_trace(str(wish.get("effect", "")), numbers)]
+        traces = [planted(str(wish.get("effect", "")), numbers)]
         subject = {"campaign": opened.name, "model": model.number, "quantity": quantity}
         self.jobs.add("plant", about | {"traces": traces}, subject)
 
@@ -370,23 +395,3 @@ class Desk:
         """Return the effects as the last `tirelib effects` has listed them."""
         told = read_document(self.session.folder / "effects.json") or {}
         return list(told.get("effects", []))
-
-
-def write_document(path: Path, document: Mapping[str, Any]) -> None:
-    """Write a small JSON document as a whole."""
-    write_atomic(path, json.dumps(document, indent=1))
-
-
-def _move(out: Path, target: Path) -> None:
-    """Move results into their place, each as a whole."""
-    target.mkdir(parents=True, exist_ok=True)
-    for result in out.iterdir():
-        place = target / result.name
-        if place.is_dir():
-            shutil.rmtree(place)
-        result.replace(place)
-
-
-def _trace(effect: str, strength: float | Sequence[float]) -> str:
-    numbers = [strength] if isinstance(strength, int | float) else strength
-    return f"{effect}=" + ",".join(repr(float(x)) for x in numbers)

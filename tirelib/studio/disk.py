@@ -3,6 +3,8 @@
 import json
 import os
 import re
+import shutil
+from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -26,6 +28,21 @@ def read_document(path: Path) -> dict[str, Any] | None:
     except (OSError, ValueError):
         return None
     return found if isinstance(found, dict) else None
+
+
+def write_document(path: Path, document: Mapping[str, Any]) -> None:
+    """Write a small JSON document as a whole."""
+    write_atomic(path, json.dumps(document, indent=1))
+
+
+def move_into(target: Path, results: Path) -> None:
+    """Move what a folder of results holds into its place, each as a whole."""
+    target.mkdir(parents=True, exist_ok=True)
+    for result in results.iterdir():
+        place = target / result.name
+        if place.is_dir():
+            shutil.rmtree(place)
+        result.replace(place)
 
 
 def safe_name(name: str) -> str:

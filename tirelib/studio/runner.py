@@ -25,13 +25,20 @@ from typing import Any, NoReturn
 
 LOADED = (
     "asammdf",
-    "tirelib.campaign",
+    "tirelib.campaign.overview",
+    "tirelib.cli.add",
+    "tirelib.cli.campaign",
+    "tirelib.cli.compare",
+    "tirelib.cli.diagnose",
+    "tirelib.cli.identify",
+    "tirelib.compare.document",
     "tirelib.compare.plot_data",
     "tirelib.diagnose.document",
     "tirelib.effects.load",
     "tirelib.extend.document",
     "tirelib.identify.forces_document",
     "tirelib.identify.whole",
+    "tirelib.model.registration",
     "tirelib.waveforms",
 )
 """Modules that are loaded before the first job: they take most of a command's start."""
@@ -119,7 +126,7 @@ class _Starter:
         self._say(job=order["start"], pid=pid)
 
     def _work(self, words: Sequence[str], files: Sequence[int]) -> NoReturn:
-        os.setsid()
+        os.setpgrp()  # Linux would weigh a session of its own against others, whatever `nice` says
         signal.set_wakeup_fd(-1)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         nothing = os.open(os.devnull, os.O_RDONLY)

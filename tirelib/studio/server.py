@@ -93,7 +93,8 @@ class Studio:
     async def _watch(self) -> None:
         """Look at the jobs at every tick."""
         while True:
-            ended, news = self.desk.jobs.look()
+            just_now, news = self.desk.jobs.look()
+            ended = [*just_now, *self.desk.released()]
             for job in ended:
                 try:
                     self.desk.ended(job)
@@ -104,7 +105,7 @@ class Studio:
                 first = self.desk.first_fits()
             if ended or first:
                 self.changed += 1
-            if news or first:
+            if news or ended or first:
                 self.wake()
             await asyncio.sleep(TICK)
 

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.unit.campaign.campaign_synthetic import HEADER, Write, changed, with_rig
-from tirelib.campaign import Run, RunPlan, write_campaign
+from tirelib.campaign import CampaignHeader, Run, RunPlan, read, write_campaign
 from tirelib.cli.campaign import campaign
 from tirelib.errors import FormatError
 
@@ -120,6 +120,26 @@ def test_show_writes_what_was_measured_as_arrays(write: Write, tmp_path: Path) -
     with np.load(file) as data:
         assert data["measured"].shape == (data["run"].size, data["angle"].size)
         assert 100.0 < np.ptp(data["measured"], axis=1).min() < 1e5  # in microstrain
+
+
+def test_show_without_a_plot_reads_each_run_once(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded, load = [], read.load_run
+
+    def counted(folder: Path, plan: RunPlan, header: CampaignHeader) -> Run:
+        loaded.append(plan.run)
+        return load(folder, plan, header)
+
+    monkeypatch.setattr(read, "load_run", counted)
+    monkeypatch.chdir(tmp_path)
+    files = ["--data", tmp_path / "measured.npz", "--json", tmp_path / "show.json"]
+    result = call("show", write(), "--no-plot", *files)
+    assert result.exit_code == 0, result.output
+    document = json.loads((tmp_path / "show.json").read_text())
+    assert document["plot"] is None
+    assert loaded == [run["run"] for run in document["runs"]]
+    assert not list(tmp_path.rglob("*.png"))
 
 
 def test_show_says_why_there_is_nothing_to_draw(

@@ -1,8 +1,9 @@
 """`tirelib.studio.runner` whose jobs write at once what a command would write.
 
 While the file of the environment variable HOLD exists, fits go on; a base fit tells its ring first
-if the file holds "first". An import with a map of the name "bad" fails. Every command line is noted
-in the file of the environment variable SAID.
+if the file holds "first". If it holds "check", checks go on instead. The check of a campaign whose
+header says "bad" tells an error. An import with a map of the name "bad" fails. Every command line
+is noted in the file of the environment variable SAID.
 """
 
 import json
@@ -56,13 +57,15 @@ def work(words: Sequence[str]) -> None:
         said.write(json.dumps({"pid": os.getpid(), "argv": words}) + "\n")
     verb = words[1] if words[0] == "campaign" else words[0]
     hold = Path(os.environ["HOLD"])
-    if (first := value(words, "--first")) and hold.exists() and hold.read_text() == "first":
+    held = hold.read_text() if hold.exists() else None
+    slow = ("check",) if held == "check" else ("add", "identify")
+    if (first := value(words, "--first")) and held == "first":
         first.write_text("model = 0\n")
     for step in range(1, 100000):
         label = f"error {9 - step}"
         told = {"progress": "fitting", "done": step, "total": None, "label": label}
         sys.stderr.write(json.dumps(told) + "\n")
-        if verb not in ("add", "identify") or not hold.exists():
+        if verb not in slow or not hold.exists():
             break
         time.sleep(0.02)
     map_file = value(words, "--map")
@@ -71,7 +74,9 @@ def work(words: Sequence[str]) -> None:
         sys.stderr.write("Error: it does not fit; choose another\n")
         sys.exit(2)
     if target := value(words, "--json"):
-        target.write_text(json.dumps(WRITES.get(verb, {})))
+        header = Path(words[2]) / "campaign.toml"
+        wrong = verb == "check" and header.exists() and "bad" in header.read_text()
+        target.write_text(json.dumps(WRITES.get(verb, {}) | ({"errors": 1} if wrong else {})))
     if (target := value(words, "--data")) and verb in ("compare", "show"):
         import numpy as np  # most commands need it not
 

@@ -63,6 +63,41 @@ def test_a_fitted_ring_is_compared_before_its_intervals_are_known(served: Served
     assert whole[whole.index("--model") + 1].endswith("M.toml")
 
 
+def test_a_base_fit_that_ends_before_the_check_waits_for_it(served: Served) -> None:
+    served.hold.write_text("check")  # the check goes on after the fit has ended
+    name = served.do(do="open", path=str(served.measured))[1]["campaign"]
+
+    def fitted() -> bool:
+        return "done" in [
+            j["state"] for j in served.campaign(name)["jobs"] if j["kind"] == "identify"
+        ]
+
+    until(fitted)
+    assert served.campaign(name)["models"][0]["ready"] is False
+    served.hold.unlink()
+    until(lambda: served.campaign(name)["models"][0]["verdict"])
+    assert verbs(served).count("identify") == 1
+
+
+def test_a_campaign_with_errors_keeps_no_fit_until_it_is_mended(served: Served) -> None:
+    header = served.measured / "campaign.toml"
+    header.write_text("bad = 1\n")
+    served.hold.touch()  # the fit goes on while the check finds the error
+    name = served.do(do="open", path=str(served.measured))[1]["campaign"]
+    until(lambda: (served.campaign(name)["check"] or {}).get("errors"))
+
+    def fits() -> list[str]:
+        return [j["state"] for j in served.campaign(name)["jobs"] if j["kind"] == "identify"]
+
+    until(lambda: fits() == ["cancelled"])
+    assert served.campaign(name)["models"][0]["ready"] is False
+    header.write_text("x = 1\n")
+    served.hold.unlink()
+    served.do(do="open", campaign=name)
+    until(lambda: served.campaign(name)["models"][0]["verdict"])
+    assert len(served.campaign(name)["models"]) == 1
+
+
 def test_a_fault_of_the_program_itself_is_told_without_its_traceback(tmp_path: Path) -> None:
     jobs = Jobs(tmp_path, RUNNER)
     job = jobs.add("check", {"campaign": "c"}, {})
@@ -199,6 +234,16 @@ def add_that_goes_on(folder: Path) -> tuple[Jobs, int]:
     jobs.look()
     until(lambda: (folder / "said").exists() and (folder / "said").read_text().endswith("\n"))
     return jobs, int(json.loads((folder / "said").read_text())["pid"])
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="it reads /proc")
+def test_a_job_has_a_group_of_its_own_in_the_session_of_those_that_it_gives_way_to(
+    tmp_path: Path,
+) -> None:
+    jobs, pid = add_that_goes_on(tmp_path)
+    starter = os.getpgid(int(Path(f"/proc/{pid}/stat").read_text().split()[3]))
+    assert (os.getpgid(pid), os.getsid(pid)) == (pid, os.getsid(starter))
+    jobs.close()
 
 
 def test_a_job_ends_when_its_server_is_gone(tmp_path: Path) -> None:

@@ -91,6 +91,9 @@ export function timeOf(job) {
 }
 export const progressOf = (number) => app.running.find((one) => one.job === number);
 
+// What the check tells better: runs that cannot be read, and a base fit that ended with them.
+export const isFinding = (job) => ["show", "identify"].includes(job.kind) && (!app.campaign?.check || app.campaign.check.errors > 0);
+
 // The last job of a kind on what is looked at, if it has failed or was ended: the user goes on without its result.
 export function failedOf(kind) {
   const c = app.campaign, last = c.jobs.filter((job) => job.kind === kind && job.subject.model === c.current && job.subject.quantity === c.quantity).at(-1);

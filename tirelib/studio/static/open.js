@@ -1,5 +1,5 @@
 // Step 1: a campaign of the list, a folder, files that are dropped, or the example.
-import { app, get, progressOf, shown, tell, upload, wish } from "./data.js";
+import { app, get, isFinding, progressOf, shown, tell, upload, wish } from "./data.js";
 import { dialog, fill, h, number, toast } from "./dom.js";
 import { importForm } from "./import.js";
 
@@ -120,8 +120,7 @@ export class Open {
         h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["", "where", "what was found", "what to do"].map((t) => h("th", {}, t)))),
           h("tbody", {}, check.problems.map((p) => h("tr", {}, h("td", { class: p.severity === "error" ? "bad" : "warn" }, p.severity), h("td", {}, p.where), h("td", {}, `${p.given}. Allowed: ${p.allowed}`), h("td", {}, p.remedy)))))));
     }
-    // runs that cannot be read are among the findings
-    const failed = c.jobs.filter((job) => ["failed", "interrupted", "cancelled"].includes(job.state) && !(job.kind === "show" && check?.errors)).slice(-4);
+    const failed = c.jobs.filter((job) => ["failed", "interrupted", "cancelled"].includes(job.state) && !isFinding(job)).slice(-4);
     const ready = c.models.some((m) => m.ready);
     const seen = ready || c.measured, unfitted = failed.some((job) => job.kind === "identify");
     const next = h("div", { class: "row" }, h("button", { class: "main", type: "button", disabled: !seen, onclick: () => this.go("see") }, ready || !seen ? "See where the model fails" : "See what was measured"),

@@ -1,5 +1,5 @@
 // Step 2: where the model fails: a map of what is left, the chosen run, and any number over any condition.
-import { active, app, arraysOf, current, documentOf, inView, labelOf, measured, progressOf, timeOf, verdictOf, wish } from "./data.js";
+import { active, app, arraysOf, current, documentOf, inView, isFinding, labelOf, measured, progressOf, timeOf, verdictOf, wish } from "./data.js";
 import { choose, csvButton, fill, h, number, unitName } from "./dom.js";
 import { Heat, limitOf } from "./heat.js";
 import { Plot } from "./plots.js";
@@ -237,14 +237,14 @@ export function wait(place, kinds = ["check", "identify", "compare"]) {
   const c = app.campaign;
   if (!c) { fill(place, h("p", {}, "Open a campaign first.")); return; }
   const running = active().filter((job) => job.subject.campaign === c.campaign);
-  const broken = c.jobs.filter((job) => ["failed", "interrupted", "cancelled"].includes(job.state) && kinds.includes(job.kind)).at(-1);
+  const broken = c.jobs.filter((job) => ["failed", "interrupted", "cancelled"].includes(job.state) && kinds.includes(job.kind) && !isFinding(job)).at(-1);
   const model = current(), idle = model && !running.length && !broken;
   if (idle && asked !== `${c.campaign}/${model.number}/${c.quantity}`) {
     asked = `${c.campaign}/${model.number}/${c.quantity}`;
     wish({ do: "look", campaign: c.campaign, model: model.number, quantity: c.quantity });
   }
   fill(place, h("h2", {}, running.length ? "Being computed" : broken ? "It could not be computed" : "Nothing to be seen yet"),
-    running.length && !model ? h("p", { class: "quiet" }, "The campaign is checked, then the base model is fitted to it and compared with it. For 66 runs that takes about 15 s on an idle machine; the page then shows it by itself. What was measured needs no model: step 2 shows it as soon as the runs are read.") : null,
+    running.length && !model ? h("p", { class: "quiet" }, "The campaign is checked while the base model is fitted to it; then they are compared. For 66 runs that takes about 15 s on an idle machine; the page then shows it by itself. What was measured needs no model: step 2 shows it as soon as the runs are read.") : null,
     c.check?.errors ? h("p", { class: "bad" }, `The campaign has ${c.check.errors} ${c.check.errors === 1 ? "error" : "errors"}: `, h("a", { href: `#/open/${c.campaign}` }, "step 1 lists them with what to do"), ".") : null,
     running.map((job) => { const at = progressOf(job.job); return h("p", {}, `${job.title}: ${job.state === "running" ? [labelOf(at) || "begins", timeOf(job)].filter(Boolean).join("; ") : "waits"}`); }),
     model && running.some((job) => job.kind === "diagnose") ? h("p", { class: "quiet" }, "A diagnosis tries the effects of the catalogue, alone and together: half a minute to three minutes on an idle machine for 66 runs of strain. Step 2 can be used meanwhile.") : null,

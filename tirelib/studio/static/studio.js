@@ -1,5 +1,5 @@
 // The frame: steps, campaign, quantity, jobs; the view of the step that the address names.
-import { active, app, connect, current, inView, labelOf, listen, nameOf, progressOf, refresh, tell, timeOf, wish } from "./data.js";
+import { active, app, connect, current, inView, isFinding, labelOf, listen, nameOf, progressOf, refresh, tell, timeOf, wish } from "./data.js";
 import { h, fill, toast } from "./dom.js";
 import { entries, Open, receive } from "./open.js";
 import { See } from "./see.js";
@@ -106,8 +106,7 @@ listen((what) => {
     if (app.home.first && !address().campaign) { go("see", app.home.first); return; }
   }
   for (const job of [...(app.campaign?.jobs || []), ...app.home.jobs]) {
-    const found = job.kind === "show" && app.campaign?.check?.errors; // it is among the findings
-    if (job.state === "failed" && !found && job.ended > begun && !told.has(job.job)) { told.add(job.job); toast(`${job.title}: ${job.message}`, true); }
+    if (job.state === "failed" && !isFinding(job) && job.ended > begun && !told.has(job.job)) { told.add(job.job); toast(`${job.title}: ${job.message}`, true); }
   }
   if (app.follow && app.home) {
     const found = app.home.jobs.find((job) => job.job === app.follow);
