@@ -59,7 +59,7 @@ def test_what_is_dropped_is_checked_or_imported(browser: Any, tmp_path: Path) ->
         for problem in check["problems"]:
             assert problem["where"] in said
             assert problem["remedy"] in said
-        assert page.evaluate("studio.campaign.models.length") == 0
+        assert page.evaluate("studio.campaign.models.some((model) => model.ready)") is False
         lost = next(tmp_path.glob("s/files/**/runs")) / "002.mf4"
         lost.write_bytes((tmp_path / "002.mf4").read_bytes())
         page.locator("#check-again").click()
@@ -173,6 +173,36 @@ def test_a_diagnosis_that_fails_says_what_can_be_done_next(browser: Any, tmp_pat
         said.get_by_role("button", name="strain").click()
         wait_for(page, "studio.campaign.quantity === 'strain'")
         page.context.close()
+
+
+NEXT = """async () => {
+  const { nextRun } = await import("/next.js"), { plain } = await import("/data.js");
+  const data = { load: [3000, 5000], pressure: [2, 2.4], speed: [40, 80], slip_angle: [-0.1, 0.1] };
+  const found = { candidates: [{ load_N: 4000, pressure_bar: 1.6, speed_kmh: 110 }] };
+  const model = { file: "/session/001/M.toml", saved_as: "M2.toml", next_as: "M3.toml" };
+  const said = plain("tirelib add x --model /session/001/M.toml --out M2.toml", model);
+  document.getElementById("main").replaceChildren(nextRun(found, said, data).element);
+}"""
+"""The next run of a plan whose slip angle only scatters."""
+
+
+def test_the_next_run_is_drawn_over_the_conditions_that_it_states(
+    browser: Any, tmp_path: Path
+) -> None:
+    with closing(Served(tmp_path)) as served:
+        until(lambda: served.server.started)
+        page = page_at(browser, f"http://{served.host}/?token={TOKEN}")
+        page.locator("#steps a").first.wait_for()
+        page.evaluate(NEXT)
+        words = page.locator("#next-run").inner_text()
+        plots = page.locator("#next-run .plot")
+        pressure, speed = (saved(page, plots.nth(k)) for k in range(2))
+        page.context.close()
+    assert "--model M2.toml --out M3.toml" in words
+    assert "4000 N, 1.6 bar, 110 km/h" in words
+    assert pressure["best next runs [bar]"] == ["", "1.6", ""]
+    assert pressure["measured runs [bar]"] == ["2", "", "2.4"]
+    assert speed["best next runs [km/h]"] == ["", "110", ""]
 
 
 HOSTILE = """async target => {

@@ -31,7 +31,7 @@ LONGEST_WISH = 1 << 18
 MOST_VIEWERS = 32
 SCRIPTS = (
     *("studio", "data", "dom", "plots", "heat", "maps"),
-    *("open", "import", "see", "suspect", "effect", "add", "compare", "take"),
+    *("open", "import", "see", "suspect", "next", "effect", "add", "compare", "take"),
 )
 STATIC = {"/": "index.html", "/studio.css": "studio.css", "/icon.svg": "icon.svg"} | {
     f"/{name}.js": f"{name}.js" for name in SCRIPTS

@@ -41,6 +41,9 @@ def campaign(desk: Desk, opened: Opened) -> dict[str, Any]:
     """Return a campaign: findings, models, jobs."""
     told_of = opened.told
     models = opened.models
+    steps: dict[str | None, int] = {None: 0}
+    for model in models:  # each after its parent
+        steps[model.number] = 1 + steps[model.told["parent"]]
     quantities = next((m.quantities for m in models if m.told["parent"] is None and m.ready), [])
     quantity = told_of.get("quantity") or next(iter(quantities), "strain")
     return {
@@ -54,7 +57,7 @@ def campaign(desk: Desk, opened: Opened) -> dict[str, Any]:
         "stale": bool(told_of.get("stale")),
         "shown": _stamp(opened.place / "show.json"),
         "measured": _stamp(opened.place / "measured.npz"),
-        "models": [_model(model, quantity) for model in models],
+        "models": [_model(m, quantity) | _files(m, steps[m.number]) for m in models],
         "jobs": [
             _job(desk, job) for job in _last(desk) if job.subject.get("campaign") == opened.name
         ],
@@ -65,9 +68,8 @@ def commands(desk: Desk, opened: Opened, number: str) -> list[str]:
     """Return the command lines that repeat the way to a model, with plain file names."""
     lines = [told(["campaign", "check", opened.folder])]
     names: dict[str, str] = {}
-    for model in opened.path_to(number):
-        name = "M.toml" if not names else f"M{len(names) + 1}.toml"
-        names[model.number] = name
+    for step, model in enumerate(opened.path_to(number), start=1):
+        names[model.number] = name = _file_name(step)
         action = str(model.told["action"])
         order: dict[str, Any] = {"campaign": opened.folder, "effect": model.told["effect"]}
         order["effect_files"] = [str(path) for path in desk.session.effect_files]
@@ -85,6 +87,17 @@ def commands(desk: Desk, opened: Opened, number: str) -> list[str]:
         words = words[: words.index("--json")]
         lines.append(told([*words, "--json", out]))
     return lines
+
+
+def _file_name(step: int) -> str:
+    """Return how the model of a step of the way is called where the way is repeated by hand."""
+    return "M.toml" if step == 1 else f"M{step}.toml"
+
+
+def _files(model: Model, step: int) -> dict[str, str]:
+    """Return a model's file in the session, and its and the next one's names by hand."""
+    own, following = _file_name(step), _file_name(step + 1)
+    return {"file": str(model.file), "saved_as": own, "next_as": following}
 
 
 def _last(desk: Desk) -> list[Job]:

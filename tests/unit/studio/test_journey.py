@@ -129,7 +129,9 @@ def test_two_ticked_effects_are_added_one_after_the_other_and_undo_goes_back(
     names = ["nonuniformity", "sidewall_load"]
     served.do(do="add", campaign=opened, model="001", effects=names)
     until(lambda: served.campaign(opened)["current"] == "004")
-    third, fourth = served.campaign(opened)["models"][2:]
+    second, third, fourth = served.campaign(opened)["models"][1:]
+    names_by_hand = [(m["saved_as"], m["next_as"]) for m in (second, third, fourth)]
+    assert names_by_hand == [("M2.toml", "M3.toml")] * 2 + [("M3.toml", "M4.toml")]
     assert (third["parent"], third["action"], third["effect"]) == ("001", "add", names[0])
     assert (fourth["parent"], fourth["action"], fourth["effect"]) == ("003", "add", names[1])
     until(lambda: served.campaign(opened)["models"][3]["verdict"])

@@ -21,7 +21,7 @@ const LINES = [
   ["error", (t) => t && `${number(t.error, 4)} ${unitName(t.error_unit)}`],
   ["not explained, rms", (t) => t && `${number(t.residual_rms)} ${unitName(t.unit)}`],
   ["effects", (t) => t && (t.effects.map((e) => `${e.effect} ${strength(e.strength)}`).join("; ") || "none")],
-  ["verdict", (_, m) => verdictOf(m.verdict, m.error_unit)],
+  ["verdict", (_, m) => verdictOf(m.verdict, m.error_unit, m.named)],
   ["held-out error", (_, m) => m.fit?.heldout_error_after && number(m.fit.heldout_error_after, 4)],
 ];
 

@@ -60,8 +60,17 @@ const VERDICTS = {
   form_inadequate: "the effect is right, its law is not", unknown: "no effect of the catalogue explains it",
 };
 
+const NUMBERS = ["no", "one", "two", "three", "four", "five"];
+
 // Where nothing was measured twice there is no noise, and no effect has been tested.
-export const verdictOf = (verdict, unit) => (verdict && unit && unit !== "noise" ? "not tested: nothing was measured twice" : VERDICTS[verdict] || verdict);
+export function verdictOf(verdict, unit, named = []) {
+  if (verdict && unit && unit !== "noise") return "not tested: nothing was measured twice";
+  if (verdict === "named" && named.length > 1) return `${NUMBERS[named.length] || named.length} effects are missing`;
+  return VERDICTS[verdict] || verdict;
+}
+
+// What a command has said of a model, with the file as step 5 calls it in the place of that of the session.
+export const plain = (said, model) => said.replaceAll(model.file, model.saved_as).replaceAll("--out M2.toml", `--out ${model.next_as}`);
 
 export const current = () => {
   const c = app.campaign;

@@ -150,7 +150,7 @@ export class See {
       h("div", { class: "figures" }, h("div", {}, h("span", { class: "quiet" }, "error of the model"), h("b", { id: "error" }, number(c.error, 4)), h("span", { class: "quiet" }, unitName(c.error_unit))),
         h("div", {}, h("span", { class: "quiet" }, "not explained, rms"), h("b", {}, number(c.residual_rms, 3)), h("span", { class: "quiet" }, `of ${number(c.measured_rms, 3)} ${unitName(c.unit)}`)),
         c.noise ? h("div", {}, h("span", { class: "quiet" }, "noise of the repeats"), h("b", {}, number(c.noise, 3)), h("span", { class: "quiet" }, unitName(c.unit))) : null,
-        h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, verdictOf(model.verdict, c.error_unit) || (c.verdict === "fits" ? "the model fits" : "not known yet")), h("span", { class: "quiet" }, !c.noise ? "the noise is not known" : c.verdict === "fits" ? "what is left is noise" : "what is left is more than noise"))),
+        h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, verdictOf(model.verdict, c.error_unit, model.named) || (c.verdict === "fits" ? "the model fits" : "not known yet")), h("span", { class: "quiet" }, !c.noise ? "the noise is not known" : c.verdict === "fits" ? "what is left is noise" : "what is left is more than noise"))),
       h("span", { class: "room" }), h("button", { class: "main", type: "button", onclick: () => this.go("suspect") }, "Find what is missing")),
     said.length ? h("details", {}, h("summary", {}, `Where it fails, in words (${said.length})`), h("ul", {}, said.map((s) => h("li", {}, s)))) : null);
     this.plots();

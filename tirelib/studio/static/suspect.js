@@ -1,10 +1,11 @@
 // Step 3: which effect is missing: the verdict in four lines, the effects by part, the trace of each.
-import { app, arraysOf, current, documentOf, failedOf, verdictOf, wish } from "./data.js";
+import { app, arraysOf, current, documentOf, failedOf, plain, verdictOf, wish } from "./data.js";
 import { fill, h, number, strength, toast, unitName } from "./dom.js";
 import { effectPage } from "./effect.js";
+import { nextRun } from "./next.js";
 import { Plot } from "./plots.js";
 import { Field, wait } from "./see.js";
-import { CONDITIONS, isStrain, sliced, unitOf } from "./maps.js";
+import { isStrain, sliced, unitOf } from "./maps.js";
 
 const TITLES = { missing: "What is missing", sure: "How sure", error: "The error", next: "What to do next" };
 const KINDS = ["check", "identify", "compare", "diagnose"];
@@ -35,7 +36,7 @@ export class Suspect {
     heat.draw(); plot.fit();
   }
 
-  leave() { window.removeEventListener("resize", this.resized); this.plot.remove(); this.field.curve.remove(); this.field.rest.remove(); }
+  leave() { window.removeEventListener("resize", this.resized); this.plot.remove(); this.nextRun?.remove(); this.field.curve.remove(); this.field.rest.remove(); }
   progress() { if (this.body.hidden) wait(this.head, KINDS); }
 
   async update() {
@@ -75,30 +76,19 @@ export class Suspect {
   }
 
   say() {
-    const { told, model } = this;
-    const apart = told.verdict === "indistinguishable" || told.candidates.some((e) => e.twins.length && told.named.includes(e.effect)) || (told.sets || []).length > 1;
-    fill(this.head, h("div", { class: "row" }, h("h2", {}, "The verdict"), h("span", { class: "tag alarm", id: "verdict" }, verdictOf(told.verdict, told.error_unit)),
+    this.nextRun?.remove();
+    this.nextRun = this.next && nextRun(this.next, plain(this.next.what || "", this.model), this.field.data);
+    const { told, model } = this, alike = told.verdict === "indistinguishable";
+    const apart = alike || told.candidates.some((e) => e.twins.length && told.named.includes(e.effect)) || (told.sets || []).length > 1;
+    fill(this.head, h("div", { class: "row" }, h("h2", {}, "The verdict"), h("span", { class: "tag alarm", id: "verdict" }, verdictOf(told.verdict, told.error_unit, told.named)),
       told.false_alarm !== undefined && told.false_alarm !== null ? h("span", { class: "quiet small" }, `chance of a false alarm: ${number(100 * told.false_alarm, 2)} %`) : null, h("span", { class: "room" }),
-      told.named.length && told.verdict !== "indistinguishable" ? h("button", { type: "button", id: "tick-named", onclick: () => { for (const box of this.list.querySelectorAll("input[data-effect]")) if (told.named.includes(box.dataset.effect) && !box.checked) box.click(); this.button.focus(); } }, told.named.length > 1 && told.verdict !== "indistinguishable" ? "Tick what is named" : "Tick it") : null,
+      told.named.length && !alike ? h("button", { type: "button", id: "tick-named", onclick: () => { for (const box of this.list.querySelectorAll("input[data-effect]")) if (told.named.includes(box.dataset.effect) && !box.checked) box.click(); this.button.focus(); } }, told.named.length > 1 ? "Tick what is named" : "Tick it") : null,
       h("button", { type: "button", onclick: () => wish({ do: "next-test", ...this.where() }).then(() => toast("The next run is being looked for.")) }, apart ? "What would tell them apart?" : "Which run to measure next?")),
-    h("dl", { class: "verdict" }, (model.lines || []).map(([what, said]) => [h("dt", {}, TITLES[what] || what), h("dd", {}, said, what === "next" && told.named.length ? h("span", { class: "quiet" }, " Here: tick it in the list below and press Add.") : null)])),
-    this.next ? this.nextTest(this.next) : null);
+    h("dl", { class: "verdict" }, (model.lines || []).map(([what, said]) => [h("dt", {}, TITLES[what] || what), h("dd", {}, plain(said, model), what === "next" && told.named.length && !alike ? h("span", { class: "quiet" }, ` Here: tick ${told.named.length > 1 ? "them" : "it"} in the list below and press Add.`) : null)])),
+    this.nextRun?.element);
   }
 
   where() { return { campaign: app.campaign.campaign, model: this.model.number, quantity: app.campaign.quantity }; }
-
-  nextTest(found) {
-    const plan = h("div", {});
-    const list = (found.candidates || []).slice(0, 3), said = found.what || "";
-    const draw = new Plot("plan", { height: 180 });
-    const { data } = this.field, x = "load", y = varyingSecond(data, x);
-    const at = (run, key) => run[{ load: "load_N", pressure: "pressure_bar", speed: "speed_kmh", slip_angle: "slip_angle_deg", camber: "camber_deg", slip_ratio: "slip_ratio" }[key]] ?? null;
-    const order = [...data.run.keys()].sort((a, b) => data[x][a] - data[x][b]);
-    const all = [...order.map((i) => [data[x][i], data[y][i], null]), ...list.map((run) => [at(run, x), null, at(run, y)])].filter(([v]) => v !== null).sort((a, b) => a[0] - b[0]);
-    queueMicrotask(() => draw.show({ title: "the plan, and the runs that would tell most", unit: unitOfCondition(y), y: label(y), x: { title: label(x), values: all.map((a) => a[0]) }, series: [{ name: "measured runs", values: all.map((a) => a[1]), color: "measured", points: true }, { name: "best next runs", values: all.map((a) => a[2]), color: "rest", points: true, hollow: true }] }));
-    fill(plan, h("h3", {}, "The next run"), h("p", {}, said.charAt(0).toUpperCase() + said.slice(1)), list.map((run) => h("p", {}, ["load_N", "pressure_bar", "speed_kmh", "slip_angle_deg", "camber_deg", "slip_ratio"].filter((k) => run[k] !== undefined && run[k] !== null).map((k) => `${k.replace("_N", " [N]").replace("_bar", " [bar]").replace("_kmh", " [km/h]").replace("_deg", " [deg]").replaceAll("_", " ")} ${number(run[k])}`).join(", "))), list.length ? draw.element : null);
-    return plan;
-  }
 
   title(name) { return app.home.effects.find((e) => e.effect === name); }
 
@@ -127,12 +117,12 @@ export class Suspect {
   named(e, fitted = null) { return h("button", { class: "small", type: "button", title: "What it is, its source, what it would look like here", onclick: () => effectPage(e.effect, fitted, this) }, e.effect); }
 
   candidate(e) {
-    const { told } = this, sets = (told.sets || []).flatMap((set, i) => (set.includes(e.effect) ? [i + 1] : []));
+    const { told } = this, named = told.named.includes(e.effect), alike = told.verdict === "indistinguishable";
     const on = () => this.hover(e.effect);
     return h("tr", { "data-rank": e.rank, "data-name": e.effect, onmouseenter: on, onfocusin: on },
       h("td", {}, this.tick(e)),
-      h("td", {}, this.named(e, e), " ", told.named.includes(e.effect) ? h("span", { class: "tag alarm" }, "named") : e.level !== "quiet" ? h("span", { class: "tag" }, e.level) : null,
-        h("div", { class: "small quiet" }, this.title(e.effect)?.title || e.title || "", e.twins.length ? ` Looks like ${e.twins.map((t) => `${t.effect} (${number(t.angle_deg, 2)} deg apart)`).join(", ")}.` : "", sets.length ? ` In set ${sets.join(", ")}.` : "")),
+      h("td", {}, this.named(e, e), " ", alike && inSets(e.effect, told) ? h("span", { class: "tag alarm" }, "indistinguishable") : named ? h("span", { class: "tag alarm" }, "named") : e.level !== "quiet" ? h("span", { class: "tag" }, e.level) : null,
+        h("div", { class: "small quiet" }, this.title(e.effect)?.title || e.title || "", e.twins.length ? ` Looks like ${e.twins.map((t) => `${t.effect} (${number(t.angle_deg, 2)} deg apart)`).join(", ")}.` : "", inSets(e.effect, told))),
       h("td", { class: "n" }, e.p !== undefined && e.p !== null ? [number(e.p, 2), e.p_std ? h("div", { class: "small quiet" }, `± ${number(e.p_std, 1)}`) : null] : number(e.score / e.threshold, 3)),
       h("td", {}, `${strength(e.strength)} ± ${strength(e.std, 2)} ${e.unit === "1" ? "" : unitName(e.unit)}`, e.in_range ? null : h("div", { class: "small warn" }, `outside the plausible ${(e.range || []).map((x) => number(x)).join(" to ")}`)),
       h("td", { class: "n" }, number(e.error_after)),
@@ -195,9 +185,8 @@ export class Suspect {
   }
 }
 
-const label = (key) => { const [, text, unit] = CONDITIONS.find(([k]) => k === key); return `${text} [${unit}]`; };
-const unitOfCondition = (key) => CONDITIONS.find(([k]) => k === key)[2];
-function varyingSecond(data, first) {
-  const spread = (k) => { const v = Array.from(data[k] || []).filter(Number.isFinite); return v.length ? (Math.max(...v) - Math.min(...v)) / (Math.max(...v.map(Math.abs)) || 1) : 0; };
-  return ["speed", "pressure", "slip_angle", "camber"].filter((k) => k !== first).sort((a, b) => spread(b) - spread(a))[0];
+// In which sets of effects, each of which explains the measurements, an effect is.
+function inSets(effect, { sets = [], verdict }) {
+  const mine = sets.flatMap((set, i) => (set.includes(effect) ? [{ number: i + 1, others: set.filter((one) => one !== effect) }] : []));
+  return mine.map(({ number: k, others }) => ` ${verdict === "indistinguishable" ? `Set ${k} of ${sets.length} that explain the measurements alike${others.length ? `, with ${others.join(", ")}` : ""}` : others.length ? `Together with ${others.join(", ")}` : "Explains the measurements alone"}.`).join("");
 }
