@@ -159,6 +159,27 @@ def test_lengths_of_the_tire_reach_the_map_of_an_import(browser: Any, tmp_path: 
     )
 
 
+def test_an_import_that_needs_a_decision_shows_where_it_is_made(
+    browser: Any, tmp_path: Path
+) -> None:
+    rows = "0;4000;-10;1\n1;4010;;2\n2;3990;-30;3\n"
+    (tmp_path / "lab.csv").write_text(f"Zeit;Radlast;Seitenkraft;Schräglauf\ns;N;N;deg\n{rows}")
+    with serve(tmp_path) as (_, url):
+        page = page_at(browser, url)
+        drop(page, tmp_path / "lab.csv")
+        page.get_by_label("axes", exact=True).select_option("iso")
+        page.get_by_label("free radius in mm").fill("316")
+        decision = page.get_by_label("rows with a missing number")
+        assert not decision.is_visible()
+        page.locator("#import").click()
+        decision.select_option("drop")
+        page.locator("#import").click()
+        wait_for(page, "studio.home.campaigns.length === 1")
+        page.context.close()
+    (run,) = read_campaign(next(tmp_path.glob("s/jobs/*/out/campaign"))).runs()
+    assert np.rad2deg(run.rig["slip_angle"]) == pytest.approx([1.0, 3.0])
+
+
 def test_a_diagnosis_that_fails_says_what_can_be_done_next(browser: Any, tmp_path: Path) -> None:
     with closing(Served(tmp_path)) as served:
         until(lambda: served.server.started)

@@ -67,6 +67,7 @@ KNOWN_NAMES: Mapping[str, str] = {
     "UMFANGSKRAFT": "Fx",
     "KIPPMOMENT": "Mx",
     "RUECKSTELLMOMENT": "Mz",
+    "SCHRAEGLAUF": "slip_angle",
     "SCHRAEGLAUFWINKEL": "slip_angle",
     "STURZ": "camber",
     "STURZWINKEL": "camber",

@@ -1,7 +1,7 @@
 // The page of an effect: what it is, its equation and source, and what it would leave in these runs.
 import { app, arraysOf, current, listen, wish } from "./data.js";
 import { dialog, h, number } from "./dom.js";
-import { isStrain, sliced, unitOf } from "./maps.js";
+import { isStrain, sliced, unitOf, valueTitle } from "./maps.js";
 import { Plot } from "./plots.js";
 
 // The strength that is tried first where none was fitted: half of the larger end of the plausible range.
@@ -23,11 +23,11 @@ export function effectPage(name, e, owner) {
     said.textContent = `What ${name} of strength ${strength}${unit} would leave, and the residual (model less measured).`;
     if (isStrain(data)) {
       const n = data.angle.length;
-      plot.show({ title: row.label, unit: "microstrain", x: { title: "wheel angle [deg]", values: Array.from(data.angle) }, series: [{ name: "residual", values: sliced(data, "difference", row.index), color: "rest" }, { name, values: trace.subarray(row.index * n, (row.index + 1) * n), color: "trace", dash: [6, 4] }] });
+      plot.show({ title: row.label, unit: "microstrain", y: valueTitle(data), x: { title: "wheel angle [deg]", values: Array.from(data.angle) }, series: [{ name: "residual", values: sliced(data, "difference", row.index), color: "rest" }, { name, values: trace.subarray(row.index * n, (row.index + 1) * n), color: "trace", dash: [6, 4] }] });
       return;
     }
     const { key, title: x } = field.slip, order = [...data.run.keys()].sort((a, b) => data[key][a] - data[key][b]);
-    plot.show({ title: "all points", unit: unitOf(data), x: { title: x, values: order.map((i) => data[key][i]) }, series: [{ name: "residual", values: order.map((i) => data.difference[i]), color: "rest", points: true }, { name, values: order.map((i) => trace[i]), color: "trace", points: true, hollow: true }] });
+    plot.show({ title: "all points", unit: unitOf(data), y: valueTitle(data), x: { title: x, values: order.map((i) => data[key][i]) }, series: [{ name: "residual", values: order.map((i) => data.difference[i]), color: "rest", points: true }, { name, values: order.map((i) => trace[i]), color: "trace", points: true, hollow: true }] });
   };
   const file = `${app.campaign.quantity}/planted.npz`;
   let stop = () => {};

@@ -98,6 +98,9 @@ function restore(before) {
   }
 }
 
+// Faults that are decided on under "How the files are read".
+const DECIDED = /\b(missing|text|backward_time) = "/;
+
 export async function importForm(files, read = {}, before = new Map()) {
   const form = await found(files), again = (stated) => importForm(files, stated, given()), how = layout(files, read, again);
   if (!form.columns) { dialog("Import", h("p", { class: "bad said" }, form.message), h("p", {}, "State below how the file is to be read, or export it again."), how.element); return; }
@@ -111,6 +114,7 @@ export async function importForm(files, read = {}, before = new Map()) {
   const set = points(measured, file.columns), steady = part("Set points of the runs", "[set_points]", h("p", { class: "small quiet" }, "Runs of the same set points are repeats; the noise is known from them. Round the means so far that repeats agree."), set.element);
   const kind = select(KINDS, map?.kind || "sweep", "kind", () => update()), strain = part("Gages", "[gages] lateral_m", h("label", {}, "Positions across the tire, from strain_1 on, with blanks between ", lateral, " mm"));
   const update = () => { steady.hidden = kind.value === "sweep"; strain.hidden = tire.hidden = !gages().length; set.update(); };
+  let reading;
   const said = h("p", { class: "bad said", role: "alert" }), sent = h("details", { hidden: true }, h("summary", {}, "The map that was sent"), h("pre", {}));
   const drawn = (faults) => {
     const channels = {};
@@ -140,18 +144,18 @@ export async function importForm(files, read = {}, before = new Map()) {
     const stop = listen((what) => {
       if (what !== "state") return;
       const job = app.home.jobs.find((one) => one.job === done.job);
-      if (job?.state === "failed") { stop(); said.className = "bad said"; said.textContent = plain(job.message, done.map); said.scrollIntoView({ block: "nearest" }); }
+      if (job?.state === "failed") { stop(); said.className = "bad said"; said.textContent = plain(job.message, done.map); reading.open ||= DECIDED.test(job.message); said.scrollIntoView({ block: "nearest" }); }
       if (job?.state === "done") { stop(); document.getElementById("dialog").close(); toast("The campaign was made."); }
     });
   };
   dialog(`Import ${(form.names || []).join(", ")}`,
-    h("p", {}, "Usual names of columns are recognised; choose the quantity of any other. Then: choose the axis system and the kind of runs, give the free radius of the tire, and check the units. Leave out what does not belong to the measurement, and columns whose range is impossible (a turn rate or a rolling radius of a broken encoder)."),
+    h("p", {}, "Usual names of columns are recognised, and columns that never change are left out; choose the quantity of any other. Then: choose the axis system and the kind of runs, give the free radius of the tire, and check the units. Leave out what does not belong to the measurement, and columns whose range is impossible (a turn rate or a rolling radius of a broken encoder)."),
     form.message ? h("p", { class: "bad said" }, form.message) : null,
     part("Campaign", "name, axes, [tire] free_radius_m", h("div", { class: "row" }, h("label", {}, "Name ", name), h("label", {}, "Axes of the files ", axes), h("label", {}, "Free radius ", radius, " mm"))),
     part("Runs", "kind, run_column", h("div", { class: "row" }, h("label", {}, "Kind ", kind), h("label", {}, "A run is ", runColumn))), steady,
     part("Columns", "[channels]", h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["column", "range", "missing", "quantity", "unit", "factor"].map((t, i) => h("th", { class: i === 1 || i === 2 ? "n" : "" }, t)))), h("tbody", {}, rows.map((r) => r.element)))),
       Object.entries(file.left_out || {}).map(([column, why]) => h("p", { class: "small warn" }, `Left out: ${column}: ${why}`))), strain, tire,
-    h("details", { open: Boolean(Object.keys(read).length) || Object.values(file.left_out || {}).some((why) => why.includes("text =")) }, h("summary", {}, "How the files are read"), (file.notes || []).map((note) => h("p", { class: "small quiet" }, note)), how.element),
+    reading = h("details", { open: Boolean(Object.keys(read).length) || Object.values(file.left_out || {}).some((why) => why.includes("text =")) }, h("summary", {}, "How the files are read"), (file.notes || []).map((note) => h("p", { class: "small quiet" }, note)), how.element),
     said, h("button", { class: "main", type: "button", id: "import", onclick: go }, "Import"), sent);
   restore(before);
   update();

@@ -4,6 +4,8 @@ import { number } from "./dom.js";
 export const CONDITIONS = [["load", "load", "N"], ["pressure", "inflation pressure", "bar"], ["speed", "speed", "km/h"], ["slip_angle", "slip angle", "deg"], ["slip_ratio", "slip ratio", "1"], ["camber", "camber", "deg"], ["temperature", "tread temperature", "degC"], ["order", "time order", "s"]];
 export const isStrain = (data) => data.texts.quantity === "strain";
 export const unitOf = (data) => (isStrain(data) ? "microstrain" : data.texts.quantity === "Mz" ? "Nm" : "N");
+// The axis of what a plot shows, with its unit and, where it has a sign of its own, its axis system.
+export const valueTitle = (data) => (isStrain(data) ? "strain [microstrain]" : `${data.texts.quantity}, ISO 8855 [${unitOf(data)}]`);
 // Whether a condition has more than one set point; what has no set points varies by more than 3 %.
 function varies(data, key) {
   if (!data[key]) return false;
@@ -47,10 +49,11 @@ export function strainRows(data, by, name) {
   });
 }
 
-// A level in words: digits that its neighbours need, and no 1e-4 for zero.
-function rounded(value, centres) {
-  const high = Math.max(...[...centres.values()].map(Math.abs)), step = 10 ** (Math.floor(Math.log10(high || 1)) - 1);
-  return number(Math.round(value / step) * step, 4);
+// A level in words: as few digits as tell every level to 1 % of the largest, and no 1e-4 for zero.
+export function rounded(value, levels) {
+  const high = Math.max(...levels.map(Math.abs)), first = 10 ** (Math.floor(Math.log10(high || 1)) - 1), to = (x, step) => Math.round(x / step) * step;
+  const step = levels.every((x) => Math.abs(to(x, first) - x) <= 0.01 * high) ? first : first / 10;
+  return number(to(value, step), 4);
 }
 
 // Round numbers that divide a range.
@@ -76,7 +79,7 @@ export function forceRows(data, by, name) {
   const rows = [...groups.values()].sort(order).map((members) => {
     const sum = new Float32Array(BINS), count = new Uint16Array(BINS);
     for (const i of members) { const k = Math.min(BINS - 1, Math.floor((BINS * (data[slipKey][i] - low)) / (high - low || 1))); sum[k] += data[name][i]; count[k] += 1; }
-    const said = keys.map((key, j) => { const [, text, unit] = CONDITIONS.find(([k]) => k === key), value = rounded(found[j].centres.get(found[j].level[members[0]]), found[j].centres); return unit === "1" ? `${text} ${value}` : `${value} ${unit}`; });
+    const said = keys.map((key, j) => { const [, text, unit] = CONDITIONS.find(([k]) => k === key), value = rounded(found[j].centres.get(found[j].level[members[0]]), [...found[j].centres.values()]); return unit === "1" ? `${text} ${value}` : `${value} ${unit}`; });
     return { members, label: said.join(", ") || "all points", tick: said.join(", "), values: sum.map((s, k) => (count[k] ? s / count[k] : NaN)), said };
   });
   return { rows, slip: { key: slipKey, title: `${slipName} [${slipUnit}]`, low, high } };

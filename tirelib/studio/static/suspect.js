@@ -5,7 +5,7 @@ import { effectPage } from "./effect.js";
 import { nextRun } from "./next.js";
 import { Plot } from "./plots.js";
 import { Field, wait } from "./see.js";
-import { isStrain, sliced, unitOf } from "./maps.js";
+import { isStrain, sliced, unitOf, valueTitle } from "./maps.js";
 
 const TITLES = { missing: "What is missing", sure: "How sure", error: "The error", next: "What to do next" };
 const KINDS = ["check", "identify", "compare", "diagnose"];
@@ -104,7 +104,7 @@ export class Suspect {
     const rank = (part) => Math.min(...groups.get(part).map((r) => Number(r.dataset.rank || 999)), 999);
     fill(this.list, h("div", { class: "row" }, h("h2", {}, "Effects"), h("span", { class: "quiet small" }, told.byHand ? "There is no verdict: tick what you suspect, and the fit tells what it takes away." : "Hover or focus a line to see what the effect would leave; tick what to add."), h("span", { class: "room" }),
       this.button = h("button", { class: "main", type: "button", id: "add", onclick: () => this.add() }, "Add")),
-    h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, told.byHand ? null : h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n" }, withP ? "p" : "score / threshold"), h("th", { title: "± one standard deviation" }, "strength"), h("th", { class: "n", title: `error with this effect, ${unitName(told.error_unit)}` }, "error with it"), h("th", { class: "n", title: "chance that a diagnosis of this plan finds the effect at this strength" }, "chance to find it"))),
+    h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, told.byHand ? null : h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n", title: "how well the measurements agree with the model that has this effect; what falls below the chance of a false alarm is rejected" }, withP ? "p with it" : "score / threshold"), h("th", { title: "± one standard deviation" }, "strength"), h("th", { class: "n", title: `error with this effect, ${unitName(told.error_unit)}` }, "error with it"), h("th", { class: "n", title: "chance that a diagnosis of this plan finds the effect at this strength" }, "chance to find it"))),
       h("tbody", {}, [...groups.keys()].filter((part) => groups.get(part).length).sort((a, b) => rank(a) - rank(b)).map((part) => [h("tr", { class: "part" }, h("td", { colspan: 6 }, part)), ...groups.get(part).sort((a, b) => Number(a.dataset.rank || 999) - Number(b.dataset.rank || 999))])))));
     this.count();
   }
@@ -126,7 +126,7 @@ export class Suspect {
       h("td", { class: "n" }, e.p !== undefined && e.p !== null ? [number(e.p, 2), e.p_std ? h("div", { class: "small quiet" }, `± ${number(e.p_std, 1)}`) : null] : number(e.score / e.threshold, 3)),
       h("td", {}, `${strength(e.strength)} ± ${strength(e.std, 2)} ${e.unit === "1" ? "" : unitName(e.unit)}`, e.in_range ? null : h("div", { class: "small warn" }, `outside the plausible ${(e.range || []).map((x) => number(x)).join(" to ")}`)),
       h("td", { class: "n" }, number(e.error_after)),
-      h("td", { class: "n small quiet" }, e.power !== undefined && e.power !== null ? `${number(100 * e.power, 2)} %` : ""));
+      h("td", { class: "n small quiet" }, e.power !== undefined && e.power !== null ? e.power < 0.01 ? "below 1 %" : `${number(100 * e.power, 2)} %` : ""));
   }
 
   owned(e) {
@@ -176,7 +176,7 @@ export class Suspect {
       rest = sliced(data, "difference", row.index);
       own = trace && trace.subarray(row.index * data.angle.length, (row.index + 1) * data.angle.length);
     }
-    this.plot.show({ title: `${title}; ${row.label}`, unit: unitOf(data), y: unitOf(data), x, series: [{ name: "residual, model less measured", values: rest, color: "rest", points }, { name: "what the effect would leave", values: own || new Array(x.values.length).fill(null), color: "trace", dash: [6, 4], points, hollow: points }] });
+    this.plot.show({ title: `${title}; ${row.label}`, unit: unitOf(data), y: valueTitle(data), x, series: [{ name: "residual, model less measured", values: rest, color: "rest", points }, { name: "what the effect would leave", values: own || new Array(x.values.length).fill(null), color: "trace", dash: [6, 4], points, hollow: points }] });
     app.drawn = performance.now() - begun; // how long a hover takes, [ms]
     if (this.field.trace?.name !== (trace ? name : undefined)) {
       clearTimeout(this.later);
