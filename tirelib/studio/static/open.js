@@ -130,7 +130,7 @@ export class Open {
       c.stale ? h("p", { class: "warn" }, "The measurements have changed since the models were fitted; the models and their errors belong to the old ones. ", h("button", { class: "small", type: "button", onclick: () => wish({ do: "fit", campaign: c.campaign }) }, "Fit a new base model")) : null, next, troubles), findings);
     const told = await shown().catch(() => null);
     if (!told || app.campaign !== c) return;
-    const { header, runs } = told, mean = (r, k) => { const x = r.mean?.[k] ?? r.set_point?.[k]; return number(k === "slip_ratio" ? (Math.abs(x) < 5e-4 ? 0 : x) : Math.abs(x) < 0.02 ? 0 : x, 4); };
+    const { header, runs } = told, mean = (r, k) => { const x = r.mean?.[k] ?? r.set_point?.[k]; const step = { slip_ratio: 1000, slip_angle_deg: 100, camber_deg: 100 }[k]; return number(step && Number.isFinite(x) ? Math.round(step * x) / step : x, 4); };
     const columns = [["Fz_N", "load [N]"], ["pressure_bar", "pressure [bar]"], ["speed_kmh", "speed [km/h]"], ["slip_angle_deg", "slip angle [deg]"], ["camber_deg", "camber [deg]"], ["slip_ratio", "slip ratio [1]"]];
     this.facts.append(h("div", { class: "card" }, h("h2", {}, `${runs.length} runs`),
       h("p", { class: "quiet small" }, `${header.tire?.name ?? ""}; free radius ${number(header.tire?.free_radius_mm, 4)} mm; ${header.gage_lateral_mm?.length ? `gages at ${header.gage_lateral_mm.join(", ")} mm` : "no gages"}; files in axes ${header.file_axes}, shown in ISO 8855. Means of the measurement, else set points.`),
