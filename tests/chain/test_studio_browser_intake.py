@@ -226,6 +226,25 @@ def test_the_next_run_is_drawn_over_the_conditions_that_it_states(
     assert speed["best next runs [km/h]"] == ["", "110", ""]
 
 
+WORDS = """async () => {
+  const { rounded } = await import("/maps.js"), { verdictOf } = await import("/data.js");
+  const loads = [220, 660, 1100], angles = [-4.01, 0.0001, 3.99];
+  return [...loads.map((x) => rounded(x, loads)), ...angles.map((x) => rounded(x, angles)),
+    verdictOf("named", "noise", ["a"]), verdictOf("named", "noise", ["a", "b"])];
+}"""
+
+
+def test_levels_and_verdicts_are_told_as_they_are(browser: Any, tmp_path: Path) -> None:
+    with closing(Served(tmp_path)) as served:
+        until(lambda: served.server.started)
+        page = page_at(browser, f"http://{served.host}/?token={TOKEN}")
+        page.locator("#steps a").first.wait_for()
+        said = page.evaluate(WORDS)
+        page.context.close()
+    assert said[:6] == ["220", "660", "1100", "\u22124", "0", "4"]
+    assert said[6:] == ["one effect is missing", "two effects are missing"]
+
+
 HOSTILE = """async target => {
   const found = {};
   const body = '{"do": "example"}';
