@@ -185,8 +185,9 @@ def flat(folder: str) -> None:
     with opened(folder) as (page, pid):
         wait(page, "!!studio.campaign?.models.some(model => model.verdict)")
         effect, other = page.evaluate(
-            "studio.home.effects.filter(e => (e.stage === 'brush') === (studio.campaign.quantity"
-            " !== 'strain')).map(e => e.effect).slice(0, 2)"
+            "fetch('/document?' + new URLSearchParams({ campaign: studio.wanted, model: '001',"
+            " quantity: studio.campaign.quantity, name: 'diagnosis' })).then((r) => r.json())"
+            ".then((told) => told.candidates.map((e) => e.effect).slice(0, 2))"
         )
         for count in range(REFITS + 1):
             if count in (0, 10, 25, 50, 75, 100):
