@@ -1,6 +1,7 @@
 """From a campaign's waveforms to what a fit needs, with every reason why it cannot be done."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -76,6 +77,16 @@ class Data:
     def with_deflection(self) -> bool:
         """Whether enough deflections are known."""
         return int(np.isfinite(self.deflection).sum()) >= LEAST_DEFLECTIONS
+
+    def take(self, index: Any) -> "Data":
+        """Return the data of some runs."""
+        return replace(
+            self,
+            strain=self.strain[index],
+            points=self.points.take(index),
+            angle_std=self.angle_std[index],
+            deflection=self.deflection[index],
+        )
 
 
 @dataclass(frozen=True, slots=True)

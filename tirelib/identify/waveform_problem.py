@@ -6,6 +6,7 @@ the model; each shape is a row, as large as one standard deviation of its coeffi
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,8 @@ from tirelib.rolling.assemble import Unknowns
 from tirelib.rolling.solve import Rolling
 from tirelib.waveforms import GRID
 
+FEW = 15
+"""Runs that tell in which valley a fit ends."""
 MISFIT = "misfit"
 """Name of the rows of the structural misfit."""
 
@@ -92,6 +95,32 @@ class WaveformProblem:
         self.ends = low, high
         self._known = np.isfinite(data.deflection) & data.with_deflection
         self._last: tuple[WaveformSolved, SolutionSlopes] | None = None
+
+    @property
+    def starts(self) -> tuple[Point, ...]:
+        """Where fits start: as given, and with a tread that is rounder across.
+
+        A stiff tread that is round and a soft one that is flat leave much the same, and between
+        them the cost is higher: a fit ends in the valley it starts in.
+        """
+        round_ = [k for k, c in enumerate(self.free) if c.name == "contact_crown"]
+        if not round_:
+            return (self.start,)
+        rounder = self.start.base.copy()
+        rounder[round_] += self.widths[round_]
+        return self.start, Point(rounder)
+
+    def thinned(self) -> "WaveformProblem":
+        """Return the problem of a quarter of the runs; itself if they are few."""
+        count = len(self.data.points)
+        if count < 2 * FEW:
+            return self
+        order = np.random.default_rng(0).permutation(count)
+        out = copy(self)
+        out.data = self.data.take(np.sort(order[: max(FEW, count // 4)]))
+        out._known = np.isfinite(out.data.deflection) & self.data.with_deflection
+        out._last = None
+        return out
 
     def whitening(self, here: WaveformSolved) -> RunWhitening:
         """Return the whitening about a solution."""

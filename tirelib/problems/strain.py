@@ -53,6 +53,8 @@ WIDTH = {
     "centrifugal_tension": 0.01,
 }
 """Prior standard deviations of the base's coordinates: wide, the campaign informs them."""
+ROUND = "contact_crown"
+"""The number by which a base has two valleys."""
 MEAN = {"centrifugal_tension": 1.0}
 """Means of priors that are narrow. All others stand about the model's own numbers."""
 OWN = 0.004
@@ -211,7 +213,8 @@ class StrainProblem:
         """The model as it is given, and with the base of a tire as the literature has it.
 
         Numbers that fit the runs well without an effect may lie in another valley than those that
-        fit them with it.
+        fit them with it. Treads that are round across and stiff, and flat and soft, are such
+        valleys: the second start lies in the one in which the model is not.
         """
         known = literature(float(np.max(self.values["pressure"])))
         there = {c.name: known[c.name].value for c in self.free if c.name in known}
@@ -220,6 +223,8 @@ class StrainProblem:
             own = float(np.max(self.values[c.name]))
             if c.name in there and (c.unit or own):  # no factor moves a zero
                 moves[k] = c.distance(own, there[c.name])
+            if c.name == ROUND and moves[k] > -0.5 * WIDTH[ROUND]:
+                moves[k] += WIDTH[ROUND]
         return self.start, replace(self.start, base=moves)
 
     @property

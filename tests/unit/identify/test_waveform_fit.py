@@ -11,13 +11,14 @@ from tirelib.errors import ConvergenceError
 from tirelib.identify.campaign_data import Data, straight_runs
 from tirelib.identify.delay import STD, UNIT, earlier
 from tirelib.identify.discrepancy import Discrepancy
+from tirelib.identify.identify import prior_std, start_file
 from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
 from tirelib.identify.waveform_problem import MISFIT, WaveformProblem, WaveformSolved
 from tirelib.identify.whiten_runs import RunWhitening
 from tirelib.infer import posterior
 from tirelib.infer.normal import Normal
 from tirelib.infer.problem import Point
-from tirelib.model.base import BARE, FREE, Coordinate, predict, values_of
+from tirelib.model.base import BARE, FREE, PLAIN, Coordinate, predict, values_of
 from tirelib.waveforms import GRID
 
 NOISE = 4e-5
@@ -282,3 +283,35 @@ def test_a_fit_stays_in_the_ranges_of_a_tire(monkeypatch: pytest.MonkeyPatch) ->
     )
     fit = plain(data())
     assert offset.distance(START.innerliner_offset, fit.values[offset.name]) == pytest.approx(end)
+
+
+@pytest.mark.parametrize("crown", [1.0, 0.05])
+def test_a_round_and_stiff_tread_is_not_taken_for_a_flat_and_soft_one(crown: float) -> None:
+    """A fit from the prior alone finds a round tread half as stiff, four deviations away."""
+    tire = TIRE.changed(
+        shear_stiffness=7e4,
+        rotary_inertia=3e-5,
+        tread_shear_stiffness=6e6,
+        tread_hardening=0.8,
+        section_pull=0.03,
+        liner_share=0.2,
+        tread_poisson=0.1,
+        contact_crown=crown,
+        creep=0.003,
+        tread_spread=0.2,
+    )
+    waves = made_waves(tire, noise=1e-5)
+    start = start_file(waves.header, straight_runs(waves), None)
+    prior = Prior(np.array([prior_std(start, c) for c in PLAIN]))
+    fit = fit_waveforms(
+        straight_runs(waves).data(),
+        values_of(start.tire),
+        prior,
+        free=PLAIN,
+        discrepancy=Discrepancy(),
+    )
+    deviation = np.sqrt(np.diag(fit.covariance))
+    for name in ("tread_stiffness", "contact_crown", "shear_stiffness"):
+        k = [c.name for c in PLAIN].index(name)
+        error = np.log(float(fit.values[name]) / getattr(tire, name))
+        assert abs(error) < 2.0 * deviation[k], name
