@@ -22,8 +22,9 @@ from tirelib.identify.waveform_problem import MISFIT, WaveformProblem, WaveformS
 from tirelib.identify.whiten_runs import RunWhitening
 from tirelib.infer.normal import Normal, Weighed
 from tirelib.infer.plain import BASE
-from tirelib.infer.posterior import ROUGH, Posterior, cost_of, posterior
+from tirelib.infer.posterior import ROUGH, Posterior, posterior
 from tirelib.infer.problem import Point
+from tirelib.infer.quadratic import cost_of
 from tirelib.model.base import FREE, Coordinate, move
 from tirelib.model.chain import Changes
 from tirelib.model.solution import Solution

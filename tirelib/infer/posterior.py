@@ -17,10 +17,10 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
 from tirelib.errors import ConvergenceError, TirelibError
-from tirelib.infer.bounded import bounded_step
 from tirelib.infer.normal import LEAST, Normal, Weighed
 from tirelib.infer.plain import BASE, ROUGHLY, View
 from tirelib.infer.problem import Model, Point, Problem
+from tirelib.infer.quadratic import Ends, Quadratic
 
 MOST_STEPS = 60
 SETTLED = 0.1
@@ -211,10 +211,7 @@ def posterior(
     names = {effect.name for effect in effects}
     others = [effect for effect in problem.living if effect.name not in names]
     point = _start(problem, [*effects, *others], near, start)
-    widths = [problem.widths, np.ones(sum(e.components for e in effects))]
-    widths += [np.full(e.components, np.sqrt(max(spread.get(e.name, 0.0), LEAST))) for e in others]
-    width = np.concatenate(widths)
-    low, high = _ends(problem, others, len(width))
+    width, ends = _widths(problem, effects, others, spread), _ends(problem, effects, others)
     solved = problem.solve(point, near.solved if near else None)
     known = None if near is None or start is not None else near.slopes_at(point)
     slopes = problem.slopes(point, solved) if known is None else known
@@ -226,55 +223,33 @@ def posterior(
         if follow is not None and 0 < count <= FOLLOWED and moved > NEAR:
             whiten = follow(solved)
             whitened, rest = _white(whiten, problem.remainder(point, solved)), whiten(solved.rest)
-        white_slopes = whiten(slopes)
-        rows = np.concatenate([white_slopes, *whitened.values()])
-        normal = Normal.of({BASE: white_slopes, **whitened}, rest)
-        metric = Weighed(normal, normal.spread(spread))
-        block = normal.blocks[BASE]
-        here = coordinates_of(point)
-        gram = metric.gram[block, block] + np.diag(width**-2)
-        gradient = metric.right(normal.right)[block] - here / width**2
-        cost = cost_of(metric, normal.right, normal.square, here, width)
-        deviation = np.sqrt(np.diag(np.linalg.inv(gram)))
-        within = low - here, high - here
-        trial, dz = None, bounded_step(gram, gradient, *within)
-        promised = _fall(gram, gradient, dz)
+        rows = {BASE: whiten(slopes), **whitened}
+        here = Quadratic.about(rows, rest, coordinates_of(point), width, spread, ends)
+        dz, cost = here.step(), here.cost
+        promised = here.fall(dz)
         little = settled * max(1.0, cost / rest.size)
         there = promised < little
-        there = there and bool((np.abs(dz[asked]) < STILL * deviation[asked]).all())
-        while not there and damping < HARDEST:
-            dz = bounded_step(gram + damping * np.diag(np.diag(gram)), gradient, *within)
-            share = min(1.0, LONGEST / float(np.abs(dz).max()))
-            tried = _tried(problem, point, share * dz, solved)
-            if tried is not None:
-                left = whiten(tried[1].rest)
-                after = cost_of(
-                    metric, rows @ left, float(left @ left), coordinates_of(tried[0]), width
-                )
-                brought = (cost - after) / (share * _fall(gram, gradient, dz))
-                if brought > LEAST_FALL:
-                    trial, moved = tried, share * float(np.abs(dz / deviation).max())
-                    break
-            damping = max(10.0 * damping, FIRST)
-        if trial is None:
+        there = there and bool((np.abs(dz[asked]) < STILL * here.deviation[asked]).all())
+        lower = None if there else _downhill(problem, here, point, solved, whiten, damping)
+        if lower is None:
             # the bottom, or its edge: slopes of a point nearby do not tell
             if exact:
                 break
             slopes, exact, damping = problem.slopes(point, solved), True, 0.0
             continue
-        (point, solved), rest = trial, left
+        point, solved, rest = lower.point, lower.solved, lower.rest
+        moved, damping = lower.moved, lower.damping
         brings = max(little, SETTLED * cost / rest.size, LOOSE * (cost - FAR * rest.size))
-        idle = idle + 1 if cost - after < brings else 0
+        idle = idle + 1 if cost - lower.cost < brings else 0
         if idle == IDLE:
-            cost = after
+            cost = lower.cost
             break
-        damping = max(damping, FIRST) if brought < GOOD else 0.1 * damping
         if progress is not None:
-            progress(f"fit of {', '.join(e.name for e in effects) or 'the base'}, cost {after:.0f}")
+            progress(f"{_label(effects)}, cost {lower.cost:.0f}")
         slopes, exact = problem.slopes(point, solved, near=True), False
     else:
         raise ConvergenceError(
-            f"fit of {', '.join(e.name for e in effects) or 'the base'}: after {MOST_STEPS} "
+            f"{_label(effects)}: after {MOST_STEPS} "
             f"steps the cost still falls by {promised:.2g}; the model does not fit these runs: "
             "look at them with `tirelib compare`",
             point,
@@ -364,22 +339,60 @@ def coordinates_of(point: Point) -> FloatArray:
     return np.concatenate([point.base, *point.ranges])
 
 
-def _ends(problem: Model, others: Sequence[Effect], count: int) -> tuple[FloatArray, FloatArray]:
+def _widths(
+    problem: Model, effects: Sequence[Effect], others: Sequence[Effect], spread: Spread
+) -> FloatArray:
+    """Return the standard deviations of all coordinates' priors."""
+    each = [problem.widths, np.ones(sum(e.components for e in effects))]
+    each += [np.full(e.components, np.sqrt(max(spread.get(e.name, 0.0), LEAST))) for e in others]
+    return np.concatenate(each)
+
+
+def _ends(problem: Model, effects: Sequence[Effect], others: Sequence[Effect]) -> Ends:
     """Return the ends of all coordinates: the base's, and what a tire shows is within its range."""
-    low, high = np.full(count, -np.inf), np.full(count, np.inf)
-    base = slice(0, len(problem.widths))
-    low[base], high[base] = problem.ends
-    first = count - sum(effect.components for effect in others)
+    low, high = problem.ends
+    free = np.full(sum(effect.components for effect in effects), np.inf)
+    lows, highs = [low, -free], [high, free]
     for effect in others:
-        rows = slice(first, first + effect.components)
-        low[rows], high[rows] = effect.low / effect.scale, effect.high / effect.scale
-        first += effect.components
-    return low, high
+        lows.append(np.full(effect.components, effect.low / effect.scale))
+        highs.append(np.full(effect.components, effect.high / effect.scale))
+    return np.concatenate(lows), np.concatenate(highs)
 
 
-def _fall(gram: FloatArray, gradient: FloatArray, dz: FloatArray) -> float:
-    """Return by how much a step lowers a quadratic cost."""
-    return float(2.0 * gradient @ dz - dz @ gram @ dz)
+def _label(effects: Sequence[Effect]) -> str:
+    return f"fit of {', '.join(e.name for e in effects) or 'the base'}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Lower:
+    """A point with a lower cost: whitened residual, longest move in deviations, next damping."""
+
+    point: Point
+    solved: Any
+    rest: FloatArray
+    cost: float
+    moved: float
+    damping: float
+
+
+def _downhill(
+    problem: Model, here: Quadratic, point: Point, solved: Any, whiten: Whiten, damping: float
+) -> _Lower | None:
+    """Return a point whose cost is lower as promised, by ever shorter steps; None if none is."""
+    while damping < HARDEST:
+        dz = here.step(damping)
+        share = min(1.0, LONGEST / float(np.abs(dz).max()))
+        tried = _tried(problem, point, share * dz, solved)
+        if tried is not None:
+            rest = whiten(tried[1].rest)
+            cost = here.cost_at(coordinates_of(tried[0]), rest)
+            brought = (here.cost - cost) / (share * here.fall(dz))
+            if brought > LEAST_FALL:
+                moved = share * float(np.abs(dz / here.deviation).max())
+                after = max(damping, FIRST) if brought < GOOD else 0.1 * damping
+                return _Lower(*tried, rest, cost, moved, after)
+        damping = max(10.0 * damping, FIRST)
+    return None
 
 
 def _tried(problem: Model, point: Point, dz: FloatArray, solved: Any) -> tuple[Point, Any] | None:
@@ -395,11 +408,3 @@ def _tried(problem: Model, point: Point, dz: FloatArray, solved: Any) -> tuple[P
         return there, problem.solve(there, solved)
     except TirelibError:
         return None
-
-
-def cost_of(
-    metric: Weighed, right: FloatArray, square: float, here: FloatArray, widths: FloatArray
-) -> float:
-    """Return J for a residual with these products, at coordinates with these prior widths."""
-    left = square - float(right @ metric.mean(right))
-    return left + float(np.sum((here / widths) ** 2))
