@@ -92,6 +92,42 @@ def test_what_is_dropped_is_checked_or_imported(browser: Any, tmp_path: Path) ->
     assert runs[1].rig["Fz"] == pytest.approx(2000.0)
 
 
+def test_an_effect_of_ones_own_is_written_from_the_page_alone(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "naive.py").write_text("def naive(strain, strength):\n    return strain\n")
+    with serve(tmp_path) as (_, url):
+        page = page_at(browser, url)
+        drop(page, tmp_path / "naive.py")
+        page.get_by_role("button", name="I have read it").click()
+        dialog = page.locator("#dialog")
+        dialog.get_by_text("naive.py: holds no effect").wait_for()  # it stays, with what to do
+        with page.expect_download() as found:
+            dialog.get_by_role("link", name="my_effect.py").click()
+        found.value.save_as(tmp_path / "mine.py")
+        dialog.get_by_role("button", name="Close").click()
+        page.evaluate("location.hash = '#/take/'")
+        page.locator("#own").get_by_text("naive.py: holds no effect").wait_for()
+        drop(page, tmp_path / "mine.py")
+        page.get_by_role("button", name="I have read it").click()
+        wait_for(page, "studio.home.effects.some((one) => one.effect === 'wet_road')")
+        wait_for(page, "!document.getElementById('dialog').open")
+        page.evaluate("location.hash = '#/take/'")
+        page.locator("#own").get_by_text("In use: mine.py").wait_for()
+        page.context.close()
+
+
+def test_a_folder_is_sent_by_the_browsers_own_choice(browser: Any, tmp_path: Path) -> None:
+    few = list(steady_runs(loads=(2000.0, 4000.0), angles=(-2.0, 2.0), repeats=1))
+    write_forces(tmp_path / "sent", few, "sent")
+    with serve(tmp_path) as (_, url):
+        page = page_at(browser, url)
+        with page.expect_file_chooser() as found:
+            page.get_by_role("button", name="Send a whole folder").click()
+        found.value.set_files(tmp_path / "sent")
+        wait_for(page, "studio.campaign?.check?.errors === 0")
+        assert page.evaluate("studio.campaign.title") == "sent"
+        page.context.close()
+
+
 def test_what_was_measured_is_seen_before_any_model_is_fitted(browser: Any, tmp_path: Path) -> None:
     with closing(Served(tmp_path)) as served:
         until(lambda: served.server.started)

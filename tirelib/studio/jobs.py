@@ -17,7 +17,7 @@ from tirelib.studio.starter import RUNNER, Starter
 AT_ONCE = max(1, min(2, (os.cpu_count() or 1)))
 """Jobs that run side by side, of those that the user waits for and of the others."""
 FIRST_VIEW = ("check", "show", "identify", "compare")
-READING = ("rig", "columns", "suggest", "import")
+READING = ("rig", "columns", "suggest", "import", "effects")
 ASKED = ("add", "remove", "plant", "next-test", *FIRST_VIEW, *READING)
 """Kinds that the user waits for: they wait for none of the others, which take long, and have more
 of the processors than these."""

@@ -31,10 +31,11 @@ LONGEST_WISH = 1 << 18
 MOST_VIEWERS = 32
 SCRIPTS = (
     *("studio", "data", "dom", "plots", "heat", "maps"),
-    *("open", "import", "see", "suspect", "next", "effect", "add", "compare", "take"),
+    *("open", "import", "see", "suspect", "next", "effect", "add", "compare", "take", "own"),
 )
-STATIC = {"/": "index.html", "/studio.css": "studio.css", "/icon.svg": "icon.svg"} | {
-    f"/{name}.js": f"{name}.js" for name in SCRIPTS
+PLAIN = ("studio.css", "icon.svg", "my_effect.py")
+STATIC = {"/": "index.html"} | {
+    f"/{name}": name for name in (*PLAIN, *(f"{name}.js" for name in SCRIPTS))
 }
 """Every address of a file, and its name."""
 JSON_DOCUMENTS = ("comparison", "diagnosis", "next-test")

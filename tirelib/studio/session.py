@@ -17,6 +17,7 @@ import hashlib
 import json
 import re
 import time
+import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +31,14 @@ QUANTITIES = ("strain", "Fy", "Fx", "Mz")
 DOCUMENTS = ("comparison.json", "diagnosis.json", "next-test.json", "traces.npz", "plots.npz")
 _CAMPAIGN = re.compile(r"[a-z0-9][a-z0-9-]{0,60}-[0-9a-f]{8}")
 _MODEL = re.compile(r"\d{3,6}")
+
+
+def _stated_name(folder: Path) -> str:
+    """Return how a campaign calls itself, else the name of its folder."""
+    try:
+        return str(tomllib.loads((folder / "campaign.toml").read_text("utf-8"))["name"])
+    except (OSError, ValueError, KeyError):
+        return folder.name
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +245,7 @@ class Session:
         opened.change(
             format=FORMAT,
             folder=str(folder),
-            title=known.get("title") or folder.name,
+            title=known.get("title") or _stated_name(folder),
             note=known.get("note") or note,
             opened=time.time(),
             current=known.get("current"),

@@ -24,6 +24,7 @@ def home(desk: Desk) -> dict[str, Any]:
                 "folder": opened.folder,
                 "there": Path(opened.folder).is_dir(),
                 "opened": opened.told.get("opened"),
+                "busy": _busy(desk, opened),
                 "models": sum(model.ready for model in opened.models),
             }
             for opened in desk.session
@@ -35,6 +36,12 @@ def home(desk: Desk) -> dict[str, Any]:
         "own_effects": [path.name for path in desk.session.effect_files],
         "jobs": [_job(desk, job) for job in _last(desk) if "campaign" not in job.subject],
     }
+
+
+def _busy(desk: Desk, opened: Opened) -> str:
+    """Return what is being done for a campaign."""
+    mine = (j for j in desk.jobs.all.values() if j.subject.get("campaign") == opened.name)
+    return ", ".join(KINDS[job.kind].title for job in mine if not job.over)
 
 
 def campaign(desk: Desk, opened: Opened) -> dict[str, Any]:

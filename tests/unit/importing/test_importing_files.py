@@ -189,6 +189,7 @@ def test_matlab_structs_matrices_and_scalars_become_columns(tmp_path: Path) -> N
     assert table.columns["run.p"].constant
     np.testing.assert_array_equal(table.columns["run.p"].rows(3), [2.3, 2.3, 2.3])
     assert set(table.left_out) == {"run.tag", "cube"}
+    assert table.left_out["run.tag"] == "it holds the text 'x', no numbers"
 
 
 def test_matlab_73_stands_transposed_in_its_file(tmp_path: Path) -> None:

@@ -24,7 +24,9 @@ class Endless:
         self.running[number], self.nice[number] = 1, words["nice"]
 
 
-@pytest.mark.parametrize("kind", ["check", "show", "identify", "compare", "add", "suggest"])
+@pytest.mark.parametrize(
+    "kind", ["check", "show", "identify", "compare", "add", "suggest", "effects"]
+)
 def test_what_the_user_waits_for_waits_for_no_diagnosis(kind: str, tmp_path: Path) -> None:
     jobs, starter = Jobs(tmp_path), Endless()
     jobs._starter = starter  # type: ignore[assignment]

@@ -98,6 +98,19 @@ def test_a_campaign_with_errors_keeps_no_fit_until_it_is_mended(served: Served) 
     assert len(served.campaign(name)["models"]) == 1
 
 
+def test_a_campaign_has_its_own_name_at_once_and_the_list_tells_that_it_is_worked_on(
+    served: Served,
+) -> None:
+    (served.measured / "campaign.toml").write_text('name = "winter tire"\n')
+    served.hold.write_text("")
+    served.do(do="open", path=str(served.measured))
+    told = until(lambda: served.get("/home")["campaigns"])[0]
+    assert told["title"] == "winter tire"
+    assert "fit the base model" in told["busy"]
+    served.hold.unlink()
+    until(lambda: not served.get("/home")["campaigns"][0]["busy"])
+
+
 def test_a_fault_of_the_program_itself_is_told_without_its_traceback(tmp_path: Path) -> None:
     jobs = Jobs(tmp_path, RUNNER)
     job = jobs.add("check", {"campaign": "c"}, {})

@@ -19,6 +19,7 @@ MAGIC_73 = b"MATLAB 7.3 MAT-file"
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 
 _WIDEST = 64  # columns of a matrix; wider ones are pictures or maps
+_LONGEST_TEXT = 80  # characters of a text that are shown
 
 
 def read_mat5(path: Path) -> Table:
@@ -92,7 +93,9 @@ def _table(path: Path, form: str, content: Mapping[str, Any], notes: tuple[str, 
     left_out: dict[str, str] = {}
     for name, value, units in _leaves(content, ""):
         array = np.asarray(value)
-        if array.dtype.kind not in "biuf" or array.ndim > 2:
+        if array.dtype.kind == "U" and array.size == 1:
+            left_out[name] = f"it holds the text {str(array)[:_LONGEST_TEXT]!r}, no numbers"
+        elif array.dtype.kind not in "biuf" or array.ndim > 2:
             left_out[name] = f"it holds {array.dtype} of shape {array.shape}, no vector of numbers"
         elif array.ndim == 2 and min(array.shape) > _WIDEST:
             left_out[name] = f"it has {array.shape[0]} x {array.shape[1]} elements, no table"

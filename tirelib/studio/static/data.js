@@ -72,6 +72,9 @@ export function verdictOf(verdict, unit, named = []) {
 // What a command has said of a model, with the file as step 5 calls it in the place of that of the session.
 export const plain = (said, model) => said.replaceAll(model.file, model.saved_as).replaceAll("--out M2.toml", `--out ${model.next_as}`);
 
+// A statement with its wheel angles in degrees, as the plots beside it have them.
+export const inDegrees = (said) => said.replace(/from (-?[\d.]+) to (-?[\d.]+) rad\b/g, (_, ...ends) => `from ${ends.slice(0, 2).map((x) => Math.round((180 / Math.PI) * x)).join(" to ")} deg`);
+
 export const current = () => {
   const c = app.campaign;
   return c ? c.models.find((m) => m.number === c.current && m.ready) || null : null;

@@ -87,7 +87,8 @@ export class Heat {
     const g = this.canvas.getContext("2d");
     g.scale(ratio, ratio);
     g.font = `${width > 1400 ? 16 : 12}px system-ui, sans-serif`;
-    const RIGHT = this.right = width > 1400 ? 82 : 62;
+    const most = number(map.limit, 2);
+    const RIGHT = this.right = Math.max(width > 1400 ? 82 : 62, 25 + g.measureText(`\u2212${most}`).width);
     const LEFT = this.left = 14 + Math.min(0.4 * width, Math.max(40, ...map.rows.map((row) => (row.tick ? g.measureText(row.tick).width : 0))));
     const w = width - LEFT - RIGHT, t = height - TOP - BOTTOM, n = map.rows.length;
     this.box = { w, t };
@@ -123,8 +124,8 @@ export class Heat {
       g.fillRect(right, TOP + t - (i + 1) * bar, 10, bar + 1);
     }
     g.fillStyle = style("--quiet"); g.textAlign = "left";
-    g.textBaseline = "top"; g.fillText(`+${number(map.limit, 2)}`, right + 13, TOP);
-    g.textBaseline = "bottom"; g.fillText(`\u2212${number(map.limit, 2)}`, right + 13, TOP + t);
+    g.textBaseline = "top"; g.fillText(`+${most}`, right + 13, TOP);
+    g.textBaseline = "bottom"; g.fillText(`\u2212${most}`, right + 13, TOP + t);
     g.textBaseline = "middle"; g.fillText("0", right + 13, TOP + t / 2);
   }
 

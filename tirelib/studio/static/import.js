@@ -20,7 +20,7 @@ const amount = (text) => (String(text).trim() ? Number(String(text).trim().repla
 const part = (title, key, ...content) => h("section", {}, h("h3", {}, title, " ", h("code", { class: "quiet" }, key)), ...content);
 
 // A message of the import without the paths of the session, which the page does not show.
-const plain = (message, map) => message.replaceAll(map, "this form").replaceAll(/\S*\/(files\/\d+|jobs\/\d+\/out)\//g, "");
+const plain = (message, map, channels) => message.replaceAll(/\bchannel (\w+)/g, (all, q) => (channels[q] ? `${all} (column ${channels[q].column})` : all)).replaceAll(map, "this form").replaceAll(/\S*\/(files\/\d+|jobs\/\d+\/out)\//g, "");
 
 // Wait for what the server finds out about the files: columns and a draft of the map, or why not.
 function found(files) {
@@ -135,6 +135,7 @@ export async function importForm(files, read = {}, before = new Map()) {
     const faults = [], made = drawn(faults);
     said.className = "bad said";
     said.textContent = faults.join("\n");
+    if (!axes.value || !(amount(radius.value) > 100)) (axes.value ? radius : axes).focus();
     const done = faults.length ? null : await wish({ do: "import", files, map: made });
     if (!done) return;
     app.follow = done.job;
@@ -144,7 +145,7 @@ export async function importForm(files, read = {}, before = new Map()) {
     const stop = listen((what) => {
       if (what !== "state") return;
       const job = app.home.jobs.find((one) => one.job === done.job);
-      if (job?.state === "failed") { stop(); said.className = "bad said"; said.textContent = plain(job.message, done.map); reading.open ||= DECIDED.test(job.message); said.scrollIntoView({ block: "nearest" }); }
+      if (job?.state === "failed") { stop(); said.className = "bad said"; said.textContent = plain(job.message, done.map, made.channels); reading.open ||= DECIDED.test(job.message); said.scrollIntoView({ block: "nearest" }); }
       if (job?.state === "done") { stop(); document.getElementById("dialog").close(); toast("The campaign was made."); }
     });
   };

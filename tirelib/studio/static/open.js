@@ -2,6 +2,7 @@
 import { app, get, isFinding, progressOf, shown, tell, upload, wish } from "./data.js";
 import { dialog, fill, h, number, toast } from "./dom.js";
 import { importForm } from "./import.js";
+import { confirmEffect, exampleFile } from "./own.js";
 
 // Every file of a drop with its place in the folder that was dropped.
 export async function entries(transfer) {
@@ -49,15 +50,18 @@ export class Open {
     this.recent = h("div", { class: "card" });
     this.facts = h("div", {});
     this.picker = h("input", { type: "file", multiple: true, hidden: true, onchange: (event) => receive([...event.target.files].map((f) => [f.name, f]), this.go) });
+    this.folders = h("input", { type: "file", webkitdirectory: true, hidden: true, onchange: (event) => receive([...event.target.files].map((f) => [f.webkitRelativePath, f]), this.go) });
     this.zone = h("div", { class: "drop", tabindex: "0", role: "button", onclick: () => this.picker.click(), onkeydown: (event) => { if (event.key === "Enter" || event.key === " ") this.picker.click(); } },
       "Drop a campaign folder, its zip archive, measured files (MAT, CSV, Parquet, TYDEX, MDF) or an effect file (.py) anywhere on this page, or click here to choose files");
+    this.whole = () => h("button", { type: "button", class: "small", "data-whole": 1, onclick: () => this.folders.click() }, "Send a whole folder …");
     this.element = h("div", { class: "two" }, h("div", {}, this.start), h("div", {}, this.facts));
     fill(this.start, h("h2", {}, "Measurements"), h("p", {}, "A campaign is a folder with campaign.toml, runs.csv and the recorded runs. Other files are imported."),
       h("div", { class: "row" },
-        h("button", { class: "main", type: "button", id: "example", onclick: () => this.example() }, "Try the example"),
+        this.trial = h("button", { class: "main", type: "button", id: "example", onclick: () => this.example() }, "Try the example"),
         h("button", { type: "button", id: "browse", onclick: () => this.browse("") }, "Choose a folder or file …")),
       h("p", { class: "quiet small" }, "The example measures a virtual tire, on this machine and now, that has a physical effect which the base model lacks. It takes less than a minute on an idle machine."),
-      this.zone, this.picker, this.progressLine = h("p", { role: "status" }));
+      this.zone, this.picker, this.folders, h("p", { class: "small quiet" }, this.whole(), " copies a folder of any place into the session, as dropping it does. An effect of your own begins with the example ", exampleFile(), "."),
+      this.progressLine = h("p", { role: "status" }));
     this.shownFor = "";
   }
 
@@ -74,7 +78,8 @@ export class Open {
       const done = await wish({ do: "open", path: folder });
       if (done) { document.getElementById("dialog").close(); opened(done, this.go); }
     };
-    dialog("Choose a campaign", h("p", { class: "quiet" }, found.path || "Folders that the server may read (tirelib studio --root adds others)"),
+    dialog("Choose a campaign", h("p", { class: "quiet" }, found.path || "Folders that the server may read where they are (tirelib studio --root adds others)"),
+      h("p", { class: "small quiet" }, "The folder is not among them? ", this.whole()),
       found.campaign ? h("button", { class: "main", type: "button", onclick: () => open(found.path) }, "Open this campaign") : null,
       h("ul", { class: "list scroll" },
         found.path ? h("li", {}, h("button", { class: "link", type: "button", onclick: () => this.browse(found.parent) }, "↑ up")) : null,
@@ -86,6 +91,7 @@ export class Open {
   progress() {
     const at = app.follow && progressOf(app.follow);
     const title = app.home?.jobs.find((job) => job.job === app.follow)?.title;
+    this.trial.disabled = Boolean(at);
     this.progressLine.textContent = reading || (at && title ? `${title}: ${at.label || "it begins"}` : "");
   }
 
@@ -100,7 +106,7 @@ export class Open {
     fill(this.recent, h("h2", {}, "Recent campaigns"),
       home.campaigns.length ? h("ul", { class: "list" }, home.campaigns.map((one) => h("li", {},
         h("button", { class: "link", type: "button", onclick: () => this.go("open", one.campaign) }, one.title), h("span", { class: "quiet small" }, one.there ? one.folder : `${one.folder} is not there`),
-        h("span", { class: "room" }), h("span", { class: "quiet small" }, `${one.models} ${one.models === 1 ? "model" : "models"}`)))) : h("p", { class: "quiet" }, "None yet."),
+        h("span", { class: "room" }), one.busy ? h("span", { class: "tag", title: one.busy }, "at work") : null, h("span", { class: "quiet small" }, `${one.models} ${one.models === 1 ? "model" : "models"}`)))) : h("p", { class: "quiet" }, "None yet."),
       broken.map((job) => h("p", { class: "warn" }, `${job.title}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: async () => { if (await wish({ do: "again", job: job.job })) app.follow = null; } }, "Run again"))));
     const c = app.campaign;
     if (!c) { fill(this.facts); this.shownFor = ""; return; }
@@ -132,19 +138,9 @@ export class Open {
     if (!told || app.campaign !== c) return;
     const { header, runs } = told, mean = (r, k) => { const x = r.mean?.[k] ?? r.set_point?.[k]; const step = { slip_ratio: 1000, slip_angle_deg: 100, camber_deg: 100 }[k]; return number(step && Number.isFinite(x) ? Math.round(step * x) / step : x, 4); };
     const columns = [["Fz_N", "load [N]"], ["pressure_bar", "pressure [bar]"], ["speed_kmh", "speed [km/h]"], ["slip_angle_deg", "slip angle [deg]"], ["camber_deg", "camber [deg]"], ["slip_ratio", "slip ratio [1]"]];
-    this.facts.append(h("div", { class: "card" }, h("h2", {}, `${runs.length} runs`),
+    this.facts.append(h("div", { class: "card" }, h("h2", {}, `${runs.length} ${runs.length === 1 ? "run" : "runs"}`),
       h("p", { class: "quiet small" }, `${header.tire?.name ?? ""}; free radius ${number(header.tire?.free_radius_mm, 4)} mm; ${header.gage_lateral_mm?.length ? `gages at ${header.gage_lateral_mm.join(", ")} mm` : "no gages"}; files in axes ${header.file_axes}, shown in ISO 8855. Means of the measurement, else set points.`),
       h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, h("th", { class: "n" }, "run"), h("th", {}, "kind"), columns.map(([, t]) => h("th", { class: "n" }, t)))),
         h("tbody", {}, runs.map((r) => h("tr", {}, h("td", { class: "n" }, r.run), h("td", {}, r.kind), columns.map(([k]) => h("td", { class: "n" }, mean(r, k))))))))));
   }
-}
-
-export function confirmEffect(effect) {
-  dialog(`Effect file ${effect.name}`,
-    h("p", { class: "warn" }, "This file is a program. If you go on, it is run on this machine with your rights. It has not been run yet. Read it, and go on only if you trust where it comes from."),
-    h("pre", { class: "scroll" }, effect.code),
-    h("button", { class: "main", type: "button", onclick: async () => {
-      const done = await wish({ do: "confirm-effect", name: effect.name, sha256: effect.sha256 });
-      if (done) { document.getElementById("dialog").close(); toast("The effect is being checked; it joins the list when it passes."); }
-    } }, "I have read it: run and check it"));
 }

@@ -1,15 +1,22 @@
 // Step 5: model, report, commands, FMU; and effects of one's own.
 import { app, current, get, nameOf, wish } from "./data.js";
 import { fill, h, save } from "./dom.js";
+import { ownEffects, ownKey } from "./own.js";
 
 export class Take {
   constructor(go) { this.go = go; this.element = h("div", {}); this.key = ""; }
 
   async update() {
     const c = app.campaign, model = current();
-    if (!c || !model) { fill(this.element, h("div", { class: "card" }, h("p", {}, "There is no model to be taken away yet."))); this.key = ""; return; }
+    if (!app.home) return;
+    if (!c || !model) {
+      const key = JSON.stringify(ownKey());
+      if (key !== this.key) fill(this.element, h("div", { class: "card" }, h("p", {}, "There is no model to be taken away yet.")), ownEffects());
+      this.key = key;
+      return;
+    }
     const jobs = c.jobs.filter((job) => ["report", "calibrate", "fmu"].includes(job.kind));
-    const key = JSON.stringify([c.campaign, model, jobs, app.home.own_effects]);
+    const key = JSON.stringify([c.campaign, model, jobs, ownKey()]);
     if (key === this.key) return;
     this.key = key;
     const about = { campaign: c.campaign, model: model.number };
@@ -26,6 +33,6 @@ export class Take {
         made("fmu", "StrainTire.fmu", ["calibrate", "fmu"], "The estimators of load, slip angle, slip ratio and lateral force are calibrated on this campaign (what it can inform) and exported as an FMU for co-simulation.", "FMU of the calibrated estimator")),
       h("div", {}, h("div", { class: "card" }, h("div", { class: "row" }, h("h2", {}, "The same by hand"), h("span", { class: "room" }), h("button", { type: "button", onclick: () => navigator.clipboard.writeText(commands.join("\n")) }, "Copy"), h("button", { type: "button", onclick: () => save("journey.sh", `${commands.join("\n")}\n`, "text/plain") }, "Save")),
         h("p", { class: "quiet" }, "These commands repeat the way to this model, in any folder; files are written into the folder where they are run."), h("pre", { id: "commands" }, commands.join("\n"))),
-      h("div", { class: "card" }, h("h2", {}, "Effects of your own"), h("p", {}, "An effect is a Python function of a dozen lines. Drop its file in step 1: it is shown, and run only after you have confirmed it; the check plants it and finds it again, then it joins the list of suspects."), app.home.own_effects.length ? h("p", {}, `In use: ${app.home.own_effects.join(", ")}`) : h("p", { class: "quiet" }, "None yet.")))));
+      ownEffects())));
   }
 }
