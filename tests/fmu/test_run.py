@@ -136,6 +136,8 @@ def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path) -> None:
     (tmp_path / "no.fmu").write_text("nothing")
     with pytest.raises(FormatError, match="is not an FMU"):
         LoadedFmu(tmp_path / "no.fmu")
+    with pytest.raises(FormatError, match=r"lost\.fmu: cannot be read \(No such file"):
+        LoadedFmu(tmp_path / "lost.fmu")
 
 
 def test_the_example_of_the_documentation_runs(capsys: pytest.CaptureFixture[str]) -> None:

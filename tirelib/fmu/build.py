@@ -106,7 +106,11 @@ def embedded_calibration(fmu: str | Path) -> Calibration:
         with zipfile.ZipFile(fmu) as archive:
             if not _sealed(archive):
                 return _read(archive.read(f"resources/{CALIBRATION}"))
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+    except OSError as error:
+        raise FormatError(
+            f"{fmu}: cannot be read ({error.strerror}); an FMU is needed; check the path"
+        ) from None
+    except (KeyError, ValueError, zipfile.BadZipFile) as error:
         raise FormatError(
             f"{fmu}: is not an FMU made by `tirelib fmu build` ({error}); build it again"
         ) from None
