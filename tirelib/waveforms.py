@@ -187,7 +187,10 @@ def _measure(run: Run, header: CampaignHeader, low_pass: LowPass) -> _Row | str:
     if run.strain is None:
         return "holds no strain"
     if run.plan.kind == "sweep":
-        return "is a sweep: its conditions change within the turns"
+        return (
+            "is a sweep: its conditions change within the turns; if they do not, state another "
+            "kind and its set points in runs.csv, or in the map of the import"
+        )
     turns = cut_turns(
         run.strain, run.rate, header.gage_lateral, trigger=run.trigger, low_pass=low_pass
     )

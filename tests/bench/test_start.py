@@ -29,6 +29,8 @@ from tirelib.arrays import FloatArray
 from tirelib.held import HELD
 from tirelib.units import to_si
 
+ROAD = {"friction": 0.9, "tread_depth": 0.008, "tread_temperature": 313.15}
+
 
 def said(given: RunInputs, *needed: str, knows_tire: bool = True) -> str:
     calibration: Any = SimpleNamespace(needed=needed, knows_tire=knows_tire)
@@ -48,7 +50,9 @@ def test_a_condition_that_the_calibration_needs_is_missed_before_the_first_turn(
 
 
 def test_what_only_makes_it_worse_is_a_note() -> None:
-    text = said(RunInputs((serial("a", 0),), Conditions.constant(pressure=2e5, camber=0.0), ()))
+    text = said(
+        RunInputs((serial("a", 0),), Conditions.constant(pressure=2e5, camber=0.0, **ROAD), ())
+    )
     assert text.startswith(
         "note: no speed: the slip ratio cannot be estimated, so no turn is valid"
     )
@@ -59,14 +63,24 @@ def test_what_only_makes_it_worse_is_a_note() -> None:
 
 
 def test_a_camber_that_nobody_gives_is_said_with_what_it_costs() -> None:
-    text = said(RunInputs((serial("a", 0),), Conditions.constant(18.0, pressure=2e5), ()))
+    text = said(RunInputs((serial("a", 0),), Conditions.constant(18.0, pressure=2e5, **ROAD), ()))
     assert text.startswith("note: no camber: standard deviations of Fy and alpha grow by the")
     assert "turns where camber dominates carry the flag camber_unknown; give --camber DEG" in text
     assert text.count("\n") == 1
 
 
+@pytest.mark.parametrize("name", ROAD)
+def test_an_unknown_road_or_tread_is_said_with_its_option(name: str) -> None:
+    known = {other: value for other, value in ROAD.items() if other != name}
+    given = Conditions.constant(18.0, pressure=2e5, camber=0.0, **known)
+    text = said(RunInputs((serial("a", 0),), given, ()))
+    assert text.startswith(f"note: no {name}: standard deviations")
+    assert f"give --condition {name}=" in text
+    assert text.count("\n") == 1
+
+
 def test_a_calibration_that_cannot_notice_another_tire_is_said() -> None:
-    everything = Conditions.constant(18.0, pressure=2e5, camber=0.0)
+    everything = Conditions.constant(18.0, pressure=2e5, camber=0.0, **ROAD)
     given = RunInputs((serial("a", 0),), everything, ())
     assert said(given) == ""
     text = said(given, knows_tire=False)
@@ -78,7 +92,9 @@ def test_what_a_bus_tells_is_not_missed_but_for_the_wheels_it_leaves_out() -> No
     text = said(RunInputs(sources, Conditions.constant(camber=0.0), ()), "pressure")
     assert "WARNING: no pressure of wheel 0: the calibration" in text
     assert "speed" not in text
-    assert said(RunInputs(sources[1:], Conditions.constant(camber=0.0), ()), "pressure") == ""
+    assert (
+        said(RunInputs(sources[1:], Conditions.constant(camber=0.0, **ROAD), ()), "pressure") == ""
+    )
 
 
 def test_a_port_file_is_waited_for_and_so_is_its_port(

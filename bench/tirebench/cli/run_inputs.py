@@ -26,13 +26,23 @@ from tirelib.units import to_si
 
 LOOK = 0.05
 """Time between two looks for a file that is waited for, [s]."""
-_OPTIONS = {"speed": "--speed KMH, ", "pressure": "--pressure BAR, ", "camber": "--camber DEG, "}
+_OPTIONS = {
+    "speed": "--speed KMH, ",
+    "pressure": "--pressure BAR, ",
+    "camber": "--camber DEG, ",
+    "friction": "--condition friction=MU, ",
+    "tread_depth": "--condition tread_depth=MM, ",
+    "tread_temperature": "--condition tread_temperature=DEGC, ",
+}
 _WITHOUT = {
     "speed": "the slip ratio cannot be estimated, so no turn is valid as a whole and the run ends "
     "with exit code 1; Fz, alpha and Fy are estimated, and --json has the validity of each",
     "pressure": "standard deviations grow by the possible effect of the pressure",
     "camber": "standard deviations of Fy and alpha grow by the possible effect of camber, and "
     "turns where camber dominates carry the flag camber_unknown",
+    "friction": "standard deviations of alpha and kappa grow by the possible effect of the road",
+    "tread_depth": "standard deviations, above all of Fz and kappa, grow by the possible wear",
+    "tread_temperature": "standard deviations, above all of Fz, grow by what heat or cold may do",
 }
 
 

@@ -264,6 +264,13 @@ def test_an_english_file_is_drafted_with_the_column_that_numbers_its_runs(tmp_pa
         "strain_2": "um/m",
         "trigger": "1",
     }
+    assert draft["kind"] == "free"  # strain is of use in steady runs only
+    assert draft["set_points"] == {
+        "load_N": {"mean_to": 100},
+        "slip_angle_deg": {"mean_to": 0.5},
+        "camber_deg": 0.0,
+        "slip_ratio": 0.0,
+    }
     back = [rows[8], *rows[:8]]  # numbers that go back count something else
     file.write_text("\n".join([names, *back]))
     assert "run_column" not in tomllib.loads(suggest_map(file))

@@ -7,7 +7,7 @@ campaign itself. What the file does not say, the draft leaves open.
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -111,6 +111,17 @@ GAGE_NAME = re.compile(r"(?:SG|DMS|GAGE|GAUGE|STRAIN|STRAINGAGE|STRAINGAUGE)0*([
 """Names of strain gages, of which each has a number."""
 RUN_NAMES = ("RUN", "RUNNO", "RUNNUMBER", "TEST", "TESTNO", "TESTNUMBER", "MESSUNG", "VERSUCH")
 """Names of a column that numbers the runs, written as those of `KNOWN_NAMES`."""
+SET_POINTS: Mapping[str, tuple[str, float]] = {
+    "load_N": ("Fz", 100.0),
+    "pressure_bar": ("pressure", 0.1),
+    "speed_kmh": ("speed", 1.0),
+    "slip_angle_deg": ("slip_angle", 0.5),
+    "camber_deg": ("camber", 0.5),
+    "slip_ratio": ("slip_ratio", 0.005),
+}
+"""Set points of steady runs: the quantity whose mean they are, and the step of rounding."""
+LENGTHS = ("ring_radius_m", "tread_thickness_m", "belt_width_m", "innerliner_offset_m")
+"""Lengths of a tire that a ring is fitted with."""
 CONSTANT = ("pressure", "speed")
 """Quantities that a rig may hold; anything else that never changes was not connected."""
 _UMLAUTS = str.maketrans({"\u00c4": "AE", "\u00d6": "OE", "\u00dc": "UE"})
@@ -243,11 +254,14 @@ def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
         else:
             others.append(item)
     axes, reason = _guessed_axes(table, known)
+    strains = [quantity for quantity in known if strain_number(quantity) is not None]
     lines = [
         f'format = "{FORMAT}"',
         f'axes = "{axes}"  # {reason}',
         f"name = {_quoted(Path(path).stem)}",
-        'kind = "sweep"  # or the kind of steady runs, with [set_points]',
+        'kind = "free"  # steady straight runs; others: corner, camber, brake, drive, combined'
+        if strains
+        else 'kind = "sweep"  # or the kind of steady runs, with [set_points]',
         *[
             f"run_column = {_quoted(item.name)}  # a guess: each of its numbers is a run"
             for item in others
@@ -256,11 +270,18 @@ def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
         "",
         "[tire]",
         "# free_radius_m = ...  # required",
-        "",
     ]
-    strains = [quantity for quantity in known if strain_number(quantity) is not None]
     if strains:
-        lines += ["[gages]", f"# lateral_m = [...]  # required: {len(strains)} positions", ""]
+        lines += [
+            *(f"# {name} = ...  # required by identify" for name in LENGTHS),
+            "",
+            "[gages]",
+            f"# lateral_m = [...]  # required: {len(strains)} positions",
+            "",
+            "[set_points]",
+            *(_set_point_line(name, known) for name in SET_POINTS),
+        ]
+    lines.append("")
     lines.append("[channels]")
     lines += [
         _channel_line(quantity, item)
@@ -272,6 +293,15 @@ def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
         for item in others
     ]
     return "\n".join([*lines, ""])
+
+
+def _set_point_line(name: str, known: Container[str]) -> str:
+    quantity, step = SET_POINTS[name]
+    if quantity in known:
+        return f"{name} = {{ mean_to = {step:g} }}  # the run's mean of {quantity}, rounded"
+    if name in ("load_N", "pressure_bar", "speed_kmh"):
+        return f"# {name} = ...  # required, or a channel {quantity} and {{ mean_to = {step:g} }}"
+    return f"{name} = 0.0  # the file has no {quantity}"
 
 
 def _channel_line(quantity: str, item: ColumnSummary) -> str:
@@ -294,7 +324,10 @@ def _guessed_axes(table: Table, known: Mapping[str, ColumnSummary]) -> tuple[str
     """Return the axis system that the signs fit (empty if not exactly one), and the reason."""
     load, force, angle = (_values(table, known, name) for name in ("Fz", "Fy", "slip_angle"))
     if load is None:
-        return "", "required: iso, sae or adapted_sae; the file has no Fz, whose sign would show it"
+        return (
+            "",
+            "required: iso, sae or adapted_sae; no column is known as Fz, whose sign tells",
+        )
     if float(np.nanmedian(load)) < 0.0:
         return "sae", "a guess: Fz is negative; check it"
     if force is None or angle is None or force.size != angle.size:
