@@ -33,9 +33,8 @@ SCRIPTS = (
     *("studio", "data", "dom", "plots", "heat", "maps"),
     *("open", "import", "see", "suspect", "next", "effect", "add", "compare", "take", "own"),
 )
-PLAIN = ("studio.css", "icon.svg", "my_effect.py")
-STATIC = {"/": "index.html"} | {
-    f"/{name}": name for name in (*PLAIN, *(f"{name}.js" for name in SCRIPTS))
+STATIC = {"/": "index.html", "/my_effect.py": "my_effect.py.txt"} | {
+    f"/{name}": name for name in ("studio.css", "icon.svg", *(f"{name}.js" for name in SCRIPTS))
 }
 """Every address of a file, and its name."""
 JSON_DOCUMENTS = ("comparison", "diagnosis", "next-test")

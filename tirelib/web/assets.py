@@ -13,7 +13,7 @@ KINDS = {
     "css": "text/css; charset=utf-8",
     "js": "text/javascript; charset=utf-8",
     "svg": "image/svg+xml",
-    "py": "text/x-python; charset=utf-8",
+    "txt": "text/plain; charset=utf-8",
 }
 """Media type of a file by the end of its name."""
 CHARTS = {"/uplot.min.js": "uplot.min.js", "/uplot.min.css": "uplot.min.css"}
