@@ -119,7 +119,8 @@ the run in good order.
     "named",
     metavar="NAME=VALUE",
     multiple=True,
-    help="Any other condition by its name, such as friction=0.8 or tread_depth=5 (mm).",
+    help="Any other condition by its name: friction=0.8, tread_depth=5 (mm), "
+    "tread_temperature=35 (degC).",
 )
 @sidecar_option
 @click.option(
