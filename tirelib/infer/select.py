@@ -361,12 +361,14 @@ def _alike(hypotheses: Hypotheses, best: Hypothesis) -> list[Hypothesis]:
 
 
 def _further(leader: Hypothesis, effects: dict[str, Effect], most: int) -> list[str]:
-    """Return the further effects that leave least beside a hypothesis, to first order, best first.
+    """Return the further effects that promise most beside a hypothesis, to first order, best first.
 
-    The one that stands out most is always among them.
+    In turn the one that stands out most and the one that leaves least: where something stands out
+    that no effect explains to first order, all leave the same.
     """
     names = [name for name in leader.null.names if name in effects]
     left, scores = leader.null.left(names), leader.scores
-    least = sorted(names, key=lambda name: left[name])[:most]
-    first = max(names, key=lambda name: scores[name], default="")
-    return least if first in least or not first else [first, *least[: most - 1]]
+    standing = sorted(names, key=lambda name: -scores[name])
+    least = sorted(names, key=lambda name: left[name])
+    turns = (name for pair in zip(standing, least, strict=True) for name in pair)
+    return list(dict.fromkeys(turns))[:most]

@@ -1,6 +1,7 @@
 """The confidence set on a linear problem whose truth is known."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from tirelib.errors import ParameterError
 from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Point
-from tirelib.infer.select import Hypotheses, _apart, select
+from tirelib.infer.select import Hypotheses, _apart, _further, select
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 
@@ -254,3 +255,14 @@ def test_starts_that_end_in_one_model_go_on_as_one() -> None:
     assert stuck.base[0] == pytest.approx(-1.0, abs=0.1)
     # a start from which the part does not settle is tried on the whole
     assert _apart(toy, toy.starts, [fits[0], None, fits[2]])[1] is toy.starts[1]
+
+
+def test_effects_that_stand_out_are_tried_though_all_leave_the_same() -> None:
+    """A shape that no effect explains to first order leaves its own score beside every effect."""
+    scores = {"a": 0.1, "b": 0.0, "c": 0.2, "d": 3.7, "e": 5.7, "shape": 6.0}
+    null = SimpleNamespace(names=list("abcde"), left=lambda names: dict.fromkeys(names, 6.0))
+    leader: Any = SimpleNamespace(null=null, scores=scores)
+    effects: Any = dict.fromkeys("abcde")
+    assert _further(leader, effects, 1) == ["e"]
+    assert {"d", "e"} <= set(_further(leader, effects, 3))
+    assert set(_further(leader, effects, 9)) == set("abcde")
