@@ -140,15 +140,19 @@ def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path) -> None:
         LoadedFmu(tmp_path / "lost.fmu")
 
 
-def test_the_example_of_the_documentation_runs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_example_of_the_documentation_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     page = Path(__file__).parents[2] / "docs" / "howto" / "fmu.md"
     code = page.read_text().split("```python\n")[2].split("```")[0]
     code = code.replace('"StrainTire.fmu", 1e4', f'"{live.fmu_file(10)}", {live.RATE}')
-    assert len(code.splitlines()) <= 27
-    strain, _ = live.strain_of(4e3, 0.0)
-    frames = [strain[:, i : i + 10] for i in range(0, strain.shape[1] - 9, 10)]
-    exec(code, {"frames": frames})
-    load, std, age = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert len(code.splitlines()) <= 22
+    write_campaign(tmp_path / "day2", live.HEADER, [live.make_run(1, 4e3, 0.0)])
+    monkeypatch.chdir(tmp_path)
+    exec(code, {})
+    valid, numbers = capsys.readouterr().out.splitlines()[-1].split(" ", 1)
+    load, std, age = json.loads(numbers)
+    assert json.loads(valid) == [1]
     assert load == pytest.approx(4e3, abs=6 * std)
     assert age > 0.0
 
