@@ -48,8 +48,10 @@ def _errors(done: ForceExtension) -> dict[str, float]:
         "error_refitted": case.error(done.before),
         "error_after": case.error(done.after),
         "floor": case.told(done.floor, done.after),
-        "heldout_error_before": case.factor * pooled(done.held_before, done.folds),
-        "heldout_error_after": case.factor * pooled(done.held_after, done.folds),
+        **{
+            f"heldout_error_{when}": pooled([case.factor * error for error in errors], done.folds)
+            for when, errors in (("before", done.held_before), ("after", done.held_after))
+        },
     }
 
 
