@@ -13,7 +13,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
-from tirelib.identify.campaign_data import Data
+from tirelib.identify.campaign_data import Data, begins_with
 from tirelib.identify.delay import STD, UNIT, by_delay, earlier
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.whiten_runs import RunWhitening
@@ -27,8 +27,6 @@ from tirelib.rolling.assemble import Unknowns
 from tirelib.rolling.solve import Rolling
 from tirelib.waveforms import GRID
 
-FEW = 15
-"""Runs that tell in which valley a fit ends."""
 MISFIT = "misfit"
 """Name of the rows of the structural misfit."""
 
@@ -112,12 +110,11 @@ class WaveformProblem:
 
     def thinned(self) -> "WaveformProblem":
         """Return the problem of a quarter of the runs; itself if they are few."""
-        count = len(self.data.points)
-        if count < 2 * FEW:
+        chosen = begins_with(len(self.data.points))
+        if chosen.all():
             return self
-        order = np.random.default_rng(0).permutation(count)
         out = copy(self)
-        out.data = self.data.take(np.sort(order[: max(FEW, count // 4)]))
+        out.data = self.data.take(chosen)
         out._known = np.isfinite(out.data.deflection) & self.data.with_deflection
         out._last = None
         return out

@@ -13,7 +13,7 @@ import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.effects import Effect
-from tirelib.identify.campaign_data import StraightRuns
+from tirelib.identify.campaign_data import StraightRuns, begins_with
 from tirelib.identify.delay import STD, UNIT, by_delay, earlier
 from tirelib.identify.literature import literature
 from tirelib.identify.random_effects import scales, tangents
@@ -64,10 +64,6 @@ NEAR = 0.05
 """Move of a strength, in ranges, within which what it adds to the slopes is kept."""
 NEAR_BASE = 0.03
 """The same of the base's coordinates."""
-FEW = 15
-"""Runs with which a fit may begin: the others only make it more accurate. To diagnose two campaigns
-of 66 runs takes 87 and 194 s of CPU with it, 91 and 185 with half, 94 and 143 with double, 110 and
-176 with all of them, on a machine that others used as well; the verdicts are the same."""
 UNKNOWN_NOISE = 0.005
 """Noise over the rms strain where there are no repeats."""
 
@@ -297,24 +293,13 @@ class StrainProblem:
 
     def thinned(self) -> "StrainProblem":
         """Return the problem of a quarter of the runs, drawn at random; itself if they are few."""
-        count = len(self.data.points)
-        if count < 2 * FEW:
-            return self
-        chosen = np.zeros(count, dtype=bool)
-        drawn = np.random.default_rng(0).permutation(count)
-        chosen[drawn[: max(FEW, count // 4)]] = True
-        return self._of(chosen)
+        chosen = begins_with(len(self.data.points))
+        return self if chosen.all() else self._of(chosen)
 
     def _of(self, chosen: BoolArray) -> "StrainProblem":
         """Return the problem of some of the runs, with the same start and effects."""
-        data, out = self.data, copy(self)
-        out.data = replace(
-            data,
-            strain=data.strain[chosen],
-            points=data.points.take(chosen),
-            angle_std=data.angle_std[chosen],
-            deflection=data.deflection[chosen],
-        )
+        out = copy(self)
+        out.data = self.data.take(chosen)
         out.noise, out._scale = self.noise[chosen], self._scale[chosen]
         out.present = int(chosen.sum())
         out.forget()
