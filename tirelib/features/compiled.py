@@ -24,7 +24,8 @@ from tirelib.signal.lowpass import LowPass
 from tirelib.signal.turn import Turns
 
 ROOM = 256
-"""Turns of which the core writes heads and features side by side."""
+"""Turns for which the core has room to write at a time. It decides about memory alone: for further
+turns the room is made anew, and the features are the same."""
 
 
 def read_by_core(core: Core, turns: Turns) -> tuple[dict[str, FloatArray], IntArray, IntArray]:

@@ -23,7 +23,7 @@ class RecordReader:
     Parameters
     ----------
     lateral : sequence of float, [m]
-        As in `tirelib.signal.cut_turns`.
+        Lateral gage positions (ISO), in the order of the samples' rows.
     low_pass : LowPass, optional
     """
 

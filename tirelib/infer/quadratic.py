@@ -34,7 +34,7 @@ class Quadratic:
     here, widths : shape (n_coordinates,)
         Coordinates, and standard deviations of their priors.
     ends : (low, high)
-        Of the coordinates.
+        Least and largest value of each coordinate.
     gram : shape (n_coordinates, n_coordinates)
         Half of the second derivative.
     gradient, deviation : shape (n_coordinates,)
