@@ -1,9 +1,10 @@
 /* Files that the core reads: what an FMU carries, and other calibrations.
  *
- * Lines of text, then doubles. The lines: the format, the GUID, the tire's name, how many variables
- * there are, then one line each: R, I, B or S for its type, p, i or o for parameter, input or
- * output, and its name. The doubles: samples of a frame, whether it is buffered, sample rate, what
- * stands for a missing value, then the calibration's table. Written by tirelib.fmu.native. */
+ * Lines of text, then doubles. The lines: the format, the GUID (for no FMU: the table's hash), the
+ * tire's name, how many variables there are, then one line each: R, I, B or S for its type, p, i or
+ * o for parameter, input or output, and its name. The doubles: samples of a frame, whether it is
+ * buffered, sample rate, what stands for a missing value, then the calibration's table. Written by
+ * tirelib.fmu.native. */
 #ifndef TIRE_RESOURCES_H
 #define TIRE_RESOURCES_H
 

@@ -1,5 +1,6 @@
 /* The model of StrainTire.fmu: parameters, the wheel's estimator, its outputs. Reference:
  * fmu_src/strain_tire.py, tirelib.fmu.wheel */
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -79,6 +80,15 @@ static const char *millimetres(const double *lateral, int gages, char text[GAGES
     return text;
 }
 
+/* Whether a file's numbers are those that were written: the line of an FMU's GUID holds their hash,
+ * or "-" in a file of an earlier version. Reference: tirelib.fmu.native.core_file */
+static int undamaged(const Resources *file) {
+    char sum[17];
+    snprintf(sum, sizeof sum, "%016" PRIx64,
+             state_hash(file->table, file->numbers * sizeof *file->table));
+    return !strcmp(file->guid, sum) || !strcmp(file->guid, "-");
+}
+
 /* Take up another calibration; tells what is wrong with it. Reference: load_wheel */
 static int override(Slave *s) {
     const char *path = s->text[P_CALIBRATION];
@@ -88,7 +98,9 @@ static int override(Slave *s) {
     int gages = s->calibration->gages, same;
     resources_free(&s->other);
     const char *wrong = known ? resources_read(&s->other, path) : "needs more memory";
-    if (!wrong && calibration_read(known, s->other.table, s->other.numbers)) wrong = "is damaged";
+    if (!wrong && (calibration_read(known, s->other.table, s->other.numbers) ||
+                   !undamaged(&s->other)))
+        wrong = "is damaged";
     if (wrong) {
         free(known);
         slave_failed(s, "FormatError: %s: %s; give a file made by `tirelib fmu table`", path,

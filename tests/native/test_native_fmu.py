@@ -17,8 +17,9 @@ from fmpy.fmi2 import FMU2Slave, fmi2CoSimulation, fmi2ModelExchange
 from fmpy.validation import validate_fmu
 
 from tests.fmu import live
+from tirelib.estimators.core_table import flat_table
 from tirelib.fmu.build import build_fmu
-from tirelib.fmu.native import BINARIES, core_file
+from tirelib.fmu.native import BINARIES, core_file, resource_file
 from tirelib.fmu.run import keeping
 from tirelib.fmu.wheel import Wheel
 from tirelib.held import HELD
@@ -283,9 +284,32 @@ def test_another_calibration_of_the_tire_can_be_given(folder: Path, tmp_path: Pa
     for frame in frames():
         host.step(*frame)
     assert host.show()[1][2]
-    table.write_bytes(table.read_bytes()[:-8])
+
+
+@pytest.mark.parametrize("at", [-16, -4000, 17], ids=["a number", "another", "the hash"])
+def test_another_calibration_with_one_wrong_bit_is_refused(
+    folder: Path, tmp_path: Path, at: int
+) -> None:
+    table, written = tmp_path / "another.table", bytearray(core_file(live.calibration()))
+    written[at] ^= 1
+    table.write_bytes(written)
+    host = Host(folder)
     with pytest.raises(FMICallException):
-        Host(folder).start(calibration=str(table))
+        host.start(calibration=str(table))
+    assert "another.table: is damaged; give a file made by" in host.said[-1]
+
+
+def test_another_calibration_written_before_it_held_a_hash_is_taken(
+    folder: Path, tmp_path: Path
+) -> None:
+    known, table = live.calibration(), tmp_path / "another.table"
+    table.write_bytes(resource_file(known.tire, flat_table(known)))
+    Host(folder).start(calibration=str(table))
+    table.write_bytes(table.read_bytes()[:-8])
+    host = Host(folder)
+    with pytest.raises(FMICallException):
+        host.start(calibration=str(table))
+    assert "is damaged" in host.said[-1]
 
 
 @pytest.mark.parametrize("place", [*(f"binaries/{name}" for name in BINARIES), GATE])

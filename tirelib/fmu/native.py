@@ -124,7 +124,18 @@ def core_file(calibration: Calibration) -> bytes:
     FormatError
         If the tire's name has more than one line, or the core does not know a regressor.
     """
-    return resource_file(calibration.tire, flat_table(calibration))
+    table = flat_table(calibration)
+    return resource_file(
+        calibration.tire, table, guid=f"{_hash(table.astype('<f8').tobytes()):016x}"
+    )
+
+
+def _hash(data: bytes) -> int:
+    """Return the FNV-1a hash of bytes, as `state_hash` of the core does, so that damage is seen."""
+    found = 14695981039346656037
+    for byte in data:
+        found = (found ^ byte) * 1099511628211 % (1 << 64)
+    return found
 
 
 def resource_file(
@@ -143,7 +154,8 @@ def resource_file(
         Name of the tire.
     data : array, shape (n,)
     guid : str
-        Identifier of the FMU, as in the model description, in braces.
+        Identifier of the FMU, as in the model description, in braces; the hash of `data` in a file
+        without FMU.
     table : sequence of Variable
         Its variables.
     numbers : four floats
