@@ -4,8 +4,8 @@
     python build/native_platforms.py
 
 A C host is compiled for each platform and run: under wine for Windows, under qemu for AArch64. It
-loads the FMU's library, whose resources lie in a folder with an odd name, and steps forty turns three
-times: with steps that are refused between, by a second instance that reads its calibration from a
+loads the FMU's library, whose resources lie in a folder with an odd name, and steps forty turns
+three times: with refused steps between, by a second instance that reads its calibration from a
 file, and after a reset with a state taken and given back. All three must give the same to the last
 bit. The outputs are held against those on Linux; those are held against the library by the tests.
 What cannot be run here is said.

@@ -1,8 +1,8 @@
-"""Closed loops with Python's FMUs and with compiled ones: the same figures, and how much faster.
+"""Co-simulations with Python's FMUs and with compiled ones: the same figures, and how much faster.
 
-    python build/cosim/closed_loop_speed.py hydroplaning antilock_low
+    python build/cosim/native_speed.py slalom range hydroplaning     # or nothing, for all
 
-Each loop is one of ``make cosim``. It runs twice in this process, and the program prints the CPU
+Each part is one of ``make cosim``. It runs twice in this process, and the program prints the CPU
 time of both runs. Everything that the two runs find is compared: numbers by their difference
 relative to the larger one, words exactly.
 """
@@ -22,8 +22,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from cosim import closed_loop
 from cosim.calibrate import CALIBRATION
-from cosim.recording import build_fmus
-from cosim.run import LOOPS, work
+from cosim.manoeuvres import MANOEUVRES
+from cosim.recording import STEP, build_fmus
+from cosim.run import DRILL, LOOPS, work
 from tirelib.threads import one_thread
 
 
@@ -68,25 +69,26 @@ def apart(one: Any, other: Any) -> tuple[int, float, str]:
 
 
 def main() -> None:
-    """Build both kinds, run each loop with both, print."""
+    """Build both kinds, run each part with both, print."""
+    parts = [*MANOEUVRES, DRILL, *LOOPS]
     options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("loops", nargs="+", choices=LOOPS)
+    options.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(parts)}")
     given = options.parse_args()
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        kinds = {
-            python: build_fmus(folder / str(python), CALIBRATION, closed_loop.STEP, python=python)
-            for python in (False, True)
-        }
-        for loop in given.loops:
+    if unknown := set(given.parts) - set(parts):
+        options.error(f"{', '.join(unknown)}: allowed are {', '.join(parts)}")
+    with tempfile.TemporaryDirectory() as folder:
+        for part in given.parts or parts:
+            step = closed_loop.STEP if part in LOOPS else STEP
             found, spent = {}, {}
-            for python, fmus in kinds.items():
+            for python in (False, True):
+                place = Path(folder) / f"{step}{python}"
+                fmus = build_fmus(place, CALIBRATION, step, python=python)
                 begin = time.process_time()
-                found[python] = work(loop, fmus)
+                found[python] = work(part, fmus)
                 spent[python] = time.process_time() - begin
             count, most, where = apart(found[False], found[True])
             sys.stdout.write(
-                f"{loop}: CPU {spent[False]:.1f} s compiled, {spent[True]:.1f} s Python, "
+                f"{part}: CPU {spent[False]:.1f} s compiled, {spent[True]:.1f} s Python, "
                 f"{spent[True] / spent[False]:.1f} times; {count} numbers, at most {most:.1e} "
                 f"apart{' in ' + where if where else ''}\n"
             )
