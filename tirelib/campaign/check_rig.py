@@ -61,6 +61,9 @@ PLAUSIBLE = {
 }
 """Where the middle of the magnitude of a quantity lies in any tire test, SI."""
 
+LOADED = (0.6, 1.1)
+"""Where a loaded radius lies, relative to the free one."""
+
 SPIKE = 20.0
 """A rig sample this many robust sigmas off its neighbours is a spike."""
 
@@ -197,14 +200,15 @@ def _rolling(run: Run, sound: list[str], header: CampaignHeader) -> list[RunFind
             )
     if "loaded_radius" in sound:
         loaded = float(np.median(run.rig["loaded_radius"]))
-        if not 0.6 * radius < loaded < 1.1 * radius:
+        low, high = LOADED
+        if not low * radius < loaded < high * radius:
             found.append(
                 finding(
                     "rolling",
                     run.plan.file,
                     "loaded_radius",
                     f"{1e3 * loaded:.4g} mm, the free radius is {1e3 * radius:.4g} mm",
-                    "60 .. 110 % of the free radius is plausible",
+                    f"{100 * low:.0f} .. {100 * high:.0f} % of the free radius is plausible",
                     "check the channel's unit and free_radius_m",
                 )
             )

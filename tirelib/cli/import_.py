@@ -1,6 +1,8 @@
 """``tirelib import``: measured files of other formats to a campaign."""
 
 import math
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from tirelib.campaign.importing.suggest import list_columns, suggest_map
 from tirelib.cli.common import FILE, NEW_FOLDER, output, write_json
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import progress_bar, progress_options
+from tirelib.errors import FormatError
 
 PLACE = click.Path(path_type=Path)
 FORMAT = "tirelib-import/1"
@@ -41,7 +44,8 @@ A map:
 \b
 Formats: .mat (5 and 7.3), .csv .tsv .txt .dat, .parquet, .tdx .tyd .tydex (TYDEX 1.3),
 .mf4 .mdf (MDF 4). Several files are one run each, in the order given.
-Exit code: 0 done, 2 bad input (all faults are listed, nothing is written).
+Exit code: 0 done, 1 --list could not read some of the files, 2 bad input (all faults are listed,
+nothing is written).
 """
 
 
@@ -54,7 +58,9 @@ Exit code: 0 done, 2 bad input (all faults are listed, nothing is written).
 @click.option("--suggest", is_flag=True, help="Print a draft of the map for FILE and stop.")
 @json_option("a summary")
 @progress_options
+@click.pass_context
 def import_(
+    context: click.Context,
     files: tuple[Path, ...],
     map_file: Path | None,
     out: Path | None,
@@ -70,13 +76,13 @@ def import_(
     if map_file is not None and (suggest or show_list):
         layout = parse_map(map_file, "")[0].csv
     if suggest:
-        click.echo(suggest_map(files[0], layout), nl=False)
+        click.echo(_draft(files, layout), nl=False)
         return
     if show_list:
-        document = {"format": LIST_FORMAT, "files": [_listed(file, layout) for file in files]}
+        document = _listed_files(files, layout)
         if json_file is not None:
             write_json(json_file, document)
-        return
+        context.exit(1 if document["unreadable"] else 0)
     if map_file is None or out is None:
         missing = " and ".join(
             name for name, given in (("--map", map_file), ("--out", out)) if given is None
@@ -127,6 +133,29 @@ def report_document(report: ImportReport) -> dict[str, Any]:
     }
 
 
+def _draft(files: Sequence[Path], layout: CsvOptions | None) -> str:
+    """Return the draft of a map for the first file that can be read."""
+    for file in files[:-1]:
+        with suppress(FormatError):
+            return suggest_map(file, layout)
+    return suggest_map(files[-1], layout)
+
+
+def _listed_files(files: Sequence[Path], layout: CsvOptions | None) -> dict[str, Any]:
+    """Print and return the columns of the files that can be read, and why others cannot be."""
+    listed, unreadable = [], []
+    for file in files:
+        try:
+            listed.append(_listed(file, layout))
+        except FormatError as error:
+            unreadable.append({"file": str(file), "reason": str(error)})
+    if not listed:
+        raise FormatError([each["reason"] for each in unreadable])
+    for each in unreadable:
+        click.echo(f"warning: {each['reason']}", err=True)
+    return {"format": LIST_FORMAT, "files": listed, "unreadable": unreadable}
+
+
 def _listed(file: Path, layout: CsvOptions | None) -> dict[str, Any]:
     """Print the columns of a file and return them as JSON has them."""
     table, columns = list_columns(file, layout)
@@ -161,6 +190,7 @@ def _listed(file: Path, layout: CsvOptions | None) -> dict[str, Any]:
                 "rows": item.rows,
                 "min": item.low,
                 "max": item.high,
+                "middle": item.middle,
                 "missing": item.missing,
                 "quantity": item.quantity or None,
             }

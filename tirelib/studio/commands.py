@@ -94,6 +94,7 @@ KINDS: Mapping[str, Kind] = {
         "list the columns of the files",
         lambda o, out: [*_read(o), "--list", "--json", f"{out}/columns.json"],
         ("columns.json",),
+        (0, 1),  # 1: some files cannot be read; the others count
     ),
     "suggest": Kind("draft a map of the columns", lambda o, out: [*_read(o), "--suggest"]),
     "import": Kind(

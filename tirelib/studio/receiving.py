@@ -9,12 +9,15 @@ from typing import Any
 
 import tomli_w
 
+from tirelib.campaign.check_gages import PLAUSIBLE_STRAIN
+from tirelib.campaign.check_rig import LOADED, PLAUSIBLE
 from tirelib.campaign.importing.mapreader import FORMAT as MAP_FORMAT
 from tirelib.errors import FormatError, ParameterError
 from tirelib.studio import intake
 from tirelib.studio.disk import read_document, safe_name, write_atomic
 from tirelib.studio.jobs import Job, Jobs
 from tirelib.studio.session import Session
+from tirelib.units import dimension_of, from_si, units_of
 
 
 class Receiving:
@@ -79,10 +82,10 @@ class Receiving:
     def read_again(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
         """Read dropped files again, as the form states their layout."""
         number, stated = str(wish.get("files", "")), wish.get("map")
-        place, files = self.files(number), self._read(number)
-        if not isinstance(stated, dict) or files is None:
+        place, listed = self.files(number), self._last(number).get("columns")
+        if not isinstance(stated, dict) or listed is None:
             raise ParameterError("import: a layout and files are needed; drop the files again")
-        self._list(number, files, self._written(place / "layout.toml", stated))
+        self._list(number, listed.order["files"], self._written(place / "layout.toml", stated))
         return {"files": number}
 
     def _foreign(self, number: str, files: Sequence[Path]) -> Mapping[str, Any]:
@@ -106,14 +109,19 @@ class Receiving:
         return {job.kind: job for job in every if job.subject.get("files") == number}
 
     def _read(self, number: str) -> list[str] | None:
-        """Return the paths of dropped files that were listed."""
+        """Return the paths of dropped files, without those that cannot be read."""
         listed = self._last(number).get("columns")
-        return None if listed is None else list(listed.order["files"])
+        if listed is None:
+            return None
+        told = read_document(self.jobs.out(listed) / "columns.json") or {}
+        unreadable = {each["file"] for each in told.get("unreadable", ())}
+        return [path for path in listed.order["files"] if path not in unreadable]
 
     def import_form(self, number: str) -> dict[str, Any]:
         """Return what is known of dropped files: columns, a draft of the map, faults."""
         self.files(number)
         found: dict[str, Any] = {"files": number, "map": None, "columns": None, "message": ""}
+        found["plausible"] = _plausible()
         last = self._last(number)
         for kind in ("columns", "suggest"):
             job = last.get(kind)
@@ -123,7 +131,7 @@ class Receiving:
                 continue
             if kind == "columns":
                 found["columns"] = read_document(self.jobs.out(job) / "columns.json")
-                found["names"] = [Path(path).name for path in job.order["files"]]
+                found["names"] = [Path(path).name for path in self._read(number) or ()]
             else:
                 text = (self.jobs.place(job) / "stdout.txt").read_text(encoding="utf-8")
                 try:
@@ -138,6 +146,7 @@ class Receiving:
         place, drawn, files = self.files(number), wish.get("map"), self._read(number)
         if not isinstance(drawn, dict) or files is None:
             raise ParameterError("import: a map and files are needed; drop the files again")
+        files = [path for path in files if path not in wish.get("without", ())]
         path = self._written(place / "map.toml", drawn)
         job = self.jobs.add("import", {"files": files, "map": path}, {"files": number})
         return {"job": job.number, "map": path, "text": Path(path).read_text(encoding="utf-8")}
@@ -170,3 +179,16 @@ class Receiving:
         files = [str(p) for p in self.session.effect_files if p != target]
         job = self.jobs.add("effects", {"effect_files": [*files, str(target)]}, {"effect": 1})
         return {"job": job.number}
+
+
+def _plausible() -> dict[str, dict[str, list[float]]]:
+    """Return the ranges of the campaign check by quantity and unit.
+
+    That of a loaded radius is one for a free radius of 1 m, that of a strain is one of its span.
+    """
+    ranges = PLAUSIBLE | {"loaded_radius": LOADED, "strain": PLAUSIBLE_STRAIN}
+    named = {name: (dimension_of(name) or name, ends) for name, ends in ranges.items()}
+    return {
+        name: {unit: [from_si(end, unit, kind) for end in ends] for unit in units_of(kind)}
+        for name, (kind, ends) in named.items()
+    }

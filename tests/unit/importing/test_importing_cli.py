@@ -112,6 +112,21 @@ def test_list_and_suggest_need_no_map(tmp_path: Path) -> None:
     )
 
 
+def test_a_listing_goes_on_after_a_file_that_cannot_be_read(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("a tire\n")
+    sound = write_csv(tmp_path / "b.csv", sae_columns())
+    listed = call(tmp_path / "a.csv", sound, "--list", "--json", tmp_path / "l.json")
+    assert listed.exit_code == 1
+    assert "warning: " in listed.stderr
+    document = json.loads((tmp_path / "l.json").read_text())
+    assert [each["file"] for each in document["files"]] == [str(sound)]
+    assert [each["file"] for each in document["unreadable"]] == [str(tmp_path / "a.csv")]
+    load = next(one for one in document["files"][0]["columns"] if one["name"] == "FZ")
+    assert load["min"] <= -load["middle"] <= load["max"] < 0.0
+    assert call(tmp_path / "a.csv", sound, "--suggest").stdout == call(sound, "--suggest").stdout
+    assert isinstance(call(tmp_path / "a.csv", "--list").exception, FormatError)
+
+
 def test_a_listing_takes_the_layout_from_a_map(tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     file.write_text("a;b|c\n1;2|3\n4;5|6\n7;8|9\n")

@@ -138,6 +138,8 @@ class ColumnSummary:
     rows : int
     low, high : float
         Extremes of the finite values, in the file's own unit; NaN when there are none.
+    middle : float
+        Median of their magnitudes.
     missing : int
         Values that are NaN or infinite.
     quantity : str
@@ -149,6 +151,7 @@ class ColumnSummary:
     rows: int
     low: float
     high: float
+    middle: float
     missing: int
     quantity: str
 
@@ -175,11 +178,11 @@ def list_columns(
 
 def _summary(column: Column) -> ColumnSummary:
     finite = column.values[np.isfinite(column.values)]
-    low, high = (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
-    missing = column.values.size - finite.size
-    return ColumnSummary(
-        column.name, column.unit, column.values.size, low, high, missing, quantity_of(column.name)
-    )
+    ends = (finite.min(), finite.max(), np.median(np.abs(finite))) if finite.size else [np.nan] * 3
+    low, high, middle = map(float, ends)
+    missing, quantity = column.values.size - finite.size, quantity_of(column.name)
+    rows = column.values.size
+    return ColumnSummary(column.name, column.unit, rows, low, high, middle, missing, quantity)
 
 
 def quantity_of(name: str) -> str:

@@ -20,7 +20,14 @@ const amount = (text) => (String(text).trim() ? Number(String(text).trim().repla
 const part = (title, key, ...content) => h("section", {}, h("h3", {}, title, " ", h("code", { class: "quiet" }, key)), ...content);
 
 // A message of the import without the paths of the session, which the page does not show.
-const plain = (message, map, channels) => message.replaceAll(/\bchannel (\w+)/g, (all, q) => (channels[q] ? `${all} (column ${channels[q].column})` : all)).replaceAll(map, "this form").replaceAll(/\S*\/(files\/\d+|jobs\/\d+\/out)\//g, "");
+export const bare = (message) => message.replaceAll(/\S*\/(files\/\d+|jobs\/\d+\/out)\//g, "");
+const plain = (message, map, channels) => bare(message.replaceAll(/\bchannel (\w+)/g, (all, q) => (channels[q] ? `${all} (column ${channels[q].column})` : all)).replaceAll(map, "this form").replaceAll(", see `tirelib import FILE --list`", "")).replace(/^campaign: not written.*/, "The campaign was not made, because its check would find errors. Correct what follows, or leave the column or the file out.");
+
+// What the campaign check would say of a size in a unit; ends: its ranges by unit, in multiples of a scale.
+function unlikely(ends, unit, size, scale = 1) {
+  const [low, high] = (ends?.[unit] || []).map((end) => end * scale), told = (x) => `${Number(x.toPrecision(3))}${unit === "1" ? "" : ` ${unit}`}`;
+  return size < low || size > high ? `${told(size)}; plausible is ${told(low)} to ${told(high)}. Is the unit right?` : "";
+}
 
 // Wait for what the server finds out about the files: columns and a draft of the map, or why not.
 function found(files) {
@@ -53,12 +60,12 @@ function layout(files, before, again) {
 }
 
 // Set points of runs that are no sweep: the mean of the measurement, a number, or a column.
-function points(measured, columns) {
+function points(measured, columns, plausible) {
   const rows = POINTS.map(([key, quantity, unit, step, fallback]) => {
     const value = field("", `${key} value`, 6), column = select([["", "choose a column"], ...columns.map((c) => [c.name, c.name])], "", `${key} column`), columnUnit = field(unit, `${key} unit`, 5);
     const how = select([["mean_to", `mean of ${quantity}, rounded to`], ["value", "the same in all runs"], ["column", "a column, constant in a run"]], "", `${key} from`, () => show());
     const show = () => { column.hidden = columnUnit.hidden = how.value !== "column"; value.hidden = how.value === "column"; value.value = how.value === "mean_to" ? step : fallback; };
-    return { key, quantity, how, value, column, columnUnit, show, element: h("tr", {}, h("td", {}, key), h("td", {}, how), h("td", {}, value, column, columnUnit)) };
+    return { key, quantity, unit, how, value, column, columnUnit, show, element: h("tr", {}, h("td", {}, key), h("td", {}, how), h("td", {}, value, column, columnUnit)) };
   });
   return {
     element: h("table", {}, h("tbody", {}, rows.map((r) => r.element))),
@@ -67,32 +74,40 @@ function points(measured, columns) {
       const x = amount(r.value.value);
       if (r.how.value === "column") { if (!r.column.value) faults.push(`[set_points] ${r.key}: choose a column.`); return [r.key, { column: r.column.value, unit: r.columnUnit.value.trim() }]; }
       if (!Number.isFinite(x)) faults.push(`[set_points] ${r.key}: give a number, or map the column of ${r.quantity}.`);
+      const fault = r.how.value === "value" && unlikely(plausible[r.quantity], r.unit, Math.abs(x));
+      if (fault) faults.push(`[set_points] ${r.key}: ${fault}`);
       return [r.key, r.how.value === "mean_to" ? { mean_to: x } : x];
     })),
   };
 }
 
 // A column of the file: its quantity, and a unit that may differ from what the file states.
-function columnRow(column, taken, change) {
+function columnRow(column, taken, plausible, radius, change) {
   const [quantity, channel] = taken.get(column.name) || ["", {}];
   const chosen = select([...new Set([...QUANTITIES, quantity])].map((q) => [q, q || "leave out"]), quantity, `quantity of ${column.name}`, () => change());
   const unit = field(channel.unit || column.unit, `unit of ${column.name}`, 7), factor = field(1, `factor of ${column.name}`, 4);
   const wrong = () => Boolean(column.unit) && unit.value.trim() !== column.unit;
   const said = h("div", { class: "small warn" });
-  unit.addEventListener("input", () => { said.textContent = wrong() ? `instead of ${column.unit} in the file` : ""; });
+  const fault = () => {
+    const strain = chosen.value.startsWith("strain_"), found = unlikely(plausible[strain ? "strain" : chosen.value], unit.value.trim(), Math.abs(amount(factor.value)) * (strain ? column.max - column.min : column.middle), chosen.value === "loaded_radius" ? radius() : 1);
+    return found && `${strain ? "it spans" : "its middle is"} ${found}${chosen.value === "loaded_radius" ? " Is the free radius?" : ""}`;
+  };
+  const show = () => { said.textContent = [wrong() ? `instead of ${column.unit} in the file` : "", fault()].filter(Boolean).join("; "); };
+  for (const one of [unit, factor]) one.addEventListener("input", show);
   const rule = () => ({ column: column.name, unit: unit.value.trim(), ...(wrong() ? { override_unit: true } : {}), ...(amount(factor.value) !== 1 ? { factor: amount(factor.value) } : {}) });
-  return { column: column.name, chosen, rule, element: h("tr", {}, h("td", {}, column.name), h("td", { class: "n" }, `${number(column.min)} … ${number(column.max)}`), h("td", { class: "n" }, column.missing || ""), h("td", {}, chosen), h("td", {}, unit, said), h("td", {}, factor)) };
+  return { column: column.name, chosen, rule, fault, show, element: h("tr", {}, h("td", {}, column.name), h("td", { class: "n" }, `${number(column.min)} … ${number(column.max)}`), h("td", { class: "n" }, column.missing || ""), h("td", {}, chosen), h("td", {}, unit, said), h("td", {}, factor)) };
 }
 
 // What the user has given stays when the files are read again: fields by their labels.
 document.addEventListener("change", (event) => { event.target.dataset.given = "1"; });
 const fields = () => [...document.querySelectorAll("#dialog [aria-label]")];
-const given = () => new Map(fields().filter((one) => one.dataset.given).map((one) => [one.getAttribute("aria-label"), one.value]));
+const content = (one) => (one.type === "checkbox" ? "checked" : "value");
+const given = () => new Map(fields().filter((one) => one.dataset.given).map((one) => [one.getAttribute("aria-label"), one[content(one)]]));
 function restore(before) {
   for (const one of fields()) {
     const value = before.get(one.getAttribute("aria-label"));
     if (value === undefined || (one.options && ![...one.options].some((o) => o.value === value))) continue;
-    one.value = value;
+    one[content(one)] = value;
     one.dataset.given = "1";
     for (const kind of ["input", "change"]) one.dispatchEvent(new Event(kind));
   }
@@ -103,17 +118,18 @@ const DECIDED = /\b(missing|text|backward_time) = "/;
 
 export async function importForm(files, read = {}, before = new Map()) {
   const form = await found(files), again = (stated) => importForm(files, stated, given()), how = layout(files, read, again);
-  if (!form.columns) { dialog("Import", h("p", { class: "bad said" }, form.message), h("p", {}, "State below how the file is to be read, or export it again."), how.element); return; }
-  const { map, columns } = form, file = columns.files[0], taken = new Map(Object.entries(map?.channels || {}).map(([q, c]) => [c.column, [q, c]]));
-  const name = field(map?.name, "name", 30), radius = field(map?.tire?.free_radius_m ? 1000 * map.tire.free_radius_m : "", "free radius in mm"), lateral = field("", "positions of the gages in mm", 26);
+  if (!form.columns) { dialog("Import", h("p", { class: "bad said" }, bare(form.message)), h("p", {}, "State below how the file is to be read, or export it again."), how.element); return; }
+  const { map, columns, plausible } = form, file = columns.files[0], taken = new Map(Object.entries(map?.channels || {}).map(([q, c]) => [c.column, [q, c]]));
+  const name = field(map?.name, "name", 30), radius = field(map?.tire?.free_radius_m ? 1000 * map.tire.free_radius_m : "", "free radius in mm", 6), lateral = field("", "positions of the gages in mm", 26);
   const lengths = LENGTHS.map(([key, text]) => ({ key, input: field(map?.tire?.[key] ? 1000 * map.tire[key] : "", `${key} in mm`), text }));
-  const tire = part("Lengths of the tire", `[tire] ${LENGTHS.map(([key]) => key).join(", ")}`, h("p", { class: "small quiet" }, "A model of the strain is fitted with these lengths. Without them the measurement is imported and shown, but no model is fitted to its strain."), h("table", {}, h("tbody", {}, lengths.map((one) => h("tr", {}, h("td", {}, one.text), h("td", {}, h("label", {}, one.input, " mm")))))));
+  const tire = part("Lengths of the tire", `[tire] ${LENGTHS.map(([key]) => key).join(", ")}`, h("p", { class: "small quiet" }, "A model of the strain is fitted with these lengths; a drawing of the tire or a cut through it shows them. Without them the measurement is imported and shown, but no model is fitted to its strain."), h("table", {}, h("tbody", {}, lengths.map((one) => h("tr", {}, h("td", {}, one.text), h("td", {}, h("label", {}, one.input, " mm")))))));
   const axes = select(AXES, map?.axes, "axes"), runColumn = select([["", "each file is a run"], ...file.columns.map((c) => [c.name, c.name])], map?.run_column, "run_column");
-  const rows = file.columns.map((column) => columnRow(column, taken, () => update()));
+  const rows = file.columns.map((column) => columnRow(column, taken, plausible, () => amount(radius.value) / 1000, () => update()));
+  radius.addEventListener("input", () => update());
   const measured = () => new Set(rows.map((r) => r.chosen.value).filter(Boolean)), gages = () => [...measured()].filter((q) => q.startsWith("strain_"));
-  const set = points(measured, file.columns), steady = part("Set points of the runs", "[set_points]", h("p", { class: "small quiet" }, "Runs of the same set points are repeats; the noise is known from them. Round the means so far that repeats agree."), set.element);
+  const set = points(measured, file.columns, plausible), steady = part("Set points of the runs", "[set_points]", h("p", { class: "small quiet" }, "Runs of the same set points are repeats; the noise is known from them. Round the means so far that repeats agree."), set.element);
   const kind = select(KINDS, map?.kind || "sweep", "kind", () => update()), strain = part("Gages", "[gages] lateral_m", h("label", {}, "Positions across the tire, from strain_1 on, with blanks between ", lateral, " mm"));
-  const update = () => { steady.hidden = kind.value === "sweep"; strain.hidden = tire.hidden = !gages().length; set.update(); };
+  const update = () => { steady.hidden = kind.value === "sweep"; strain.hidden = tire.hidden = !gages().length; set.update(); rows.forEach((row) => row.show()); };
   let reading;
   const said = h("p", { class: "bad said", role: "alert" }), sent = h("details", { hidden: true }, h("summary", {}, "The map that was sent"), h("pre", {}));
   const drawn = (faults) => {
@@ -121,9 +137,10 @@ export async function importForm(files, read = {}, before = new Map()) {
     for (const row of rows.filter((r) => r.chosen.value)) {
       if (channels[row.chosen.value]) faults.push(`Two columns are ${row.chosen.value}; leave one out.`);
       channels[row.chosen.value] = row.rule();
+      if (row.fault()) faults.push(`[channels] ${row.chosen.value} (column ${row.column}): ${row.fault()} Mend the unit, or leave the column out.`);
     }
     if (!axes.value) faults.push("Choose the axis system of the files.");
-    if (!(amount(radius.value) > 100)) faults.push("Give the free radius of the tire in mm, for instance 316.");
+    if (!(amount(radius.value) > 100)) faults.push("Give the free radius of the tire in mm: half of its diameter without load.");
     if (!Object.keys(channels).length) faults.push("Choose at least one column.");
     for (const one of gages().length ? lengths : []) if (one.input.value.trim() && !Number.isFinite(amount(one.input.value))) faults.push(`[tire] ${one.key}: give a number in mm, or leave it empty.`);
     const places = lateral.value.trim().split(/[\s;]+/).filter(Boolean).map(amount);
@@ -136,7 +153,7 @@ export async function importForm(files, read = {}, before = new Map()) {
     said.className = "bad said";
     said.textContent = faults.join("\n");
     if (!axes.value || !(amount(radius.value) > 100)) (axes.value ? radius : axes).focus();
-    const done = faults.length ? null : await wish({ do: "import", files, map: made });
+    const done = faults.length ? null : await wish({ do: "import", files, map: made, without: kept.filter(([, box]) => !box.checked).map(([path]) => path) });
     if (!done) return;
     app.follow = done.job;
     said.className = "said";
@@ -149,10 +166,13 @@ export async function importForm(files, read = {}, before = new Map()) {
       if (job?.state === "done") { stop(); document.getElementById("dialog").close(); toast("The campaign was made."); }
     });
   };
-  dialog(`Import ${(form.names || []).join(", ")}`,
+  const { names } = form, kept = columns.files.map(({ file: path }, i) => [path, h("input", { type: "checkbox", checked: true, "aria-label": `import ${names[i]}` })]);
+  dialog(`Import ${names.length > 3 ? `${names.length} files, ${names[0]} to ${names.at(-1)}` : names.join(", ")}`,
     h("p", {}, "Usual names of columns are recognised, and columns that never change are left out; choose the quantity of any other. Then: choose the axis system and the kind of runs, give the free radius of the tire, and check the units. Leave out what does not belong to the measurement, and columns whose range is impossible (a turn rate or a rolling radius of a broken encoder)."),
-    form.message ? h("p", { class: "bad said" }, form.message) : null,
-    part("Campaign", "name, axes, [tire] free_radius_m", h("div", { class: "row" }, h("label", {}, "Name ", name), h("label", {}, "Axes of the files ", axes), h("label", {}, "Free radius ", radius, " mm"))),
+    form.message ? h("p", { class: "bad said" }, bare(form.message)) : null,
+    columns.unreadable.length ? h("div", { class: "bad", id: "unreadable" }, `${columns.unreadable.length} of ${columns.unreadable.length + columns.files.length} files cannot be read and will be left out; mend them and send the folder again, or go on without them:`, h("ul", {}, columns.unreadable.map((one) => h("li", {}, bare(one.reason))))) : null,
+    kept.length > 1 ? h("details", { id: "files" }, h("summary", {}, "Files: untick what is no run"), h("div", { class: "row small" }, kept.map(([, box], i) => h("label", {}, box, ` ${names[i]}`)))) : null,
+    part("Campaign", "name, axes, [tire] free_radius_m", h("div", { class: "row" }, h("label", {}, "Name ", name), h("label", {}, "Axes of the files ", axes), h("label", {}, "Free radius ", radius, " mm")), h("p", { class: "small quiet" }, "The free radius is half of the diameter that the inflated tire has without load. By its size a 205/55 R16 has 16 × 25.4 / 2 + 0.55 × 205 = 316 mm, a 16 × 7.5-10 has 16 × 25.4 / 2 = 203 mm. A loaded radius is up to a tenth less.")),
     part("Runs", "kind, run_column", h("div", { class: "row" }, h("label", {}, "Kind ", kind), h("label", {}, "A run is ", runColumn))), steady,
     part("Columns", "[channels]", h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["column", "range", "missing", "quantity", "unit", "factor"].map((t, i) => h("th", { class: i === 1 || i === 2 ? "n" : "" }, t)))), h("tbody", {}, rows.map((r) => r.element)))),
       Object.entries(file.left_out || {}).map(([column, why]) => h("p", { class: "small warn" }, `Left out: ${column}: ${why}`))), strain, tire,

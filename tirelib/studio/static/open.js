@@ -1,7 +1,7 @@
 // Step 1: a campaign of the list, a folder, files that are dropped, or the example.
-import { app, get, isFinding, progressOf, shown, tell, upload, wish } from "./data.js";
+import { app, get, isFinding, shown, stepOf, tell, upload, wish } from "./data.js";
 import { dialog, fill, h, number, toast } from "./dom.js";
-import { importForm } from "./import.js";
+import { bare, importForm } from "./import.js";
 import { confirmEffect, exampleFile } from "./own.js";
 
 // Every file of a drop with its place in the folder that was dropped.
@@ -89,10 +89,9 @@ export class Open {
   }
 
   progress() {
-    const at = app.follow && progressOf(app.follow);
-    const title = app.home?.jobs.find((job) => job.job === app.follow)?.title;
-    this.trial.disabled = Boolean(at);
-    this.progressLine.textContent = reading || (at && title ? `${title}: ${at.label || "it begins"}` : "");
+    const job = app.follow && app.home?.jobs.find((one) => one.job === app.follow && ["waiting", "running"].includes(one.state));
+    this.trial.disabled = Boolean(job);
+    this.progressLine.textContent = reading || (job ? `${job.title}: ${stepOf(job)}` : "");
   }
 
   update() {
@@ -101,13 +100,13 @@ export class Open {
     this.progress();
     // what failed before the same kind of job went well is no news
     const last = (kind) => Math.max(0, ...home.jobs.filter((job) => job.kind === kind && job.state === "done").map((job) => job.job));
-    const broken = home.jobs.filter((job) => ["rig", "import"].includes(job.kind) && ["interrupted", "failed", "cancelled"].includes(job.state) && job.job > last(job.kind)).slice(-3);
+    const broken = home.jobs.filter((job) => ["rig", "import"].includes(job.kind) && ["interrupted", "failed", "cancelled"].includes(job.state) && job.job > last(job.kind)).slice(-1);
     this.element.children[app.wanted ? 0 : 1].append(this.recent); // the right half belongs to the campaign that is open
     fill(this.recent, h("h2", {}, "Recent campaigns"),
       home.campaigns.length ? h("ul", { class: "list" }, home.campaigns.map((one) => h("li", {},
         h("button", { class: "link", type: "button", onclick: () => this.go("open", one.campaign) }, one.title), h("span", { class: "quiet small" }, one.there ? one.folder : `${one.folder} is not there`),
         h("span", { class: "room" }), one.busy ? h("span", { class: "tag", title: one.busy }, "at work") : null, h("span", { class: "quiet small" }, `${one.models} ${one.models === 1 ? "model" : "models"}`)))) : h("p", { class: "quiet" }, "None yet."),
-      broken.map((job) => h("p", { class: "warn" }, `${job.title}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: async () => { if (await wish({ do: "again", job: job.job })) app.follow = null; } }, "Run again"))));
+      broken.map((job) => h("p", { class: "warn said" }, `${job.title}: ${job.state}. ${bare(job.message)} `, h("button", { class: "small", type: "button", onclick: async () => { if (await wish({ do: "again", job: job.job })) app.follow = null; } }, "Run again"))));
     const c = app.campaign;
     if (!c) { fill(this.facts); this.shownFor = ""; return; }
     const key = JSON.stringify([c.campaign, c.stale, c.check, c.shown, c.measured, c.models.length, c.jobs.map((j) => j.state)]);
