@@ -82,7 +82,7 @@ def walk(page: Any, campaign: str | None, picture: Any) -> dict[str, float]:
     took["first progress"] = wait(page, "studio.running.some(job => job.what === 'fitting')")
     wait(
         page,
-        "studio.running.some(job => job.errors.length > 6) || studio.campaign.current !== '001'",
+        "studio.running.some(job => job.costs.length > 6) || studio.campaign.current !== '001'",
     )
     took["added"] = wait(page, "studio.campaign.current === '002'")
     page.wait_for_selector("#error-after")

@@ -124,7 +124,7 @@ class StrainModels:
             partial(held_out, each, fold, self.yardstick) for each in new for fold in self.folds
         ]
         if len(calls) > ahead and self.progress is not None:
-            self.progress("fits without some of the runs")
+            self.progress(f"holding out some of the runs: {len(calls) - ahead} fits to the others")
         found = forked(calls)
         if fit is not None and ahead:
             self._least[fit] = found[0]

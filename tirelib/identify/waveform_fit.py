@@ -165,7 +165,8 @@ def fit_waveforms(
     begin = problem.start
     if len(few.starts) > 1:
         if progress is not None:
-            progress(f"fits of {len(few.data.points)} runs from {len(few.starts)} starts")
+            count, starts = len(few.data.points), len(few.starts)
+            progress(f"fitting the base model to {count} of the runs first, from {starts} starts")
         begun = forked([partial(_valley, few, each) for each in few.starts])
         begin = min(begun, key=lambda each: each[0])[1]
     fit, whiten = _settled(problem, begin, SETTLED, step)

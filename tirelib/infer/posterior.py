@@ -245,11 +245,11 @@ def posterior(
             cost = lower.cost
             break
         if progress is not None:
-            progress(f"{_label(effects)}, cost {lower.cost:.0f}")
+            progress(f"fitting {_model(effects)}, step {count + 1}, cost {lower.cost:.0f}")
         slopes, exact = problem.slopes(point, solved, near=True), False
     else:
         raise ConvergenceError(
-            f"{_label(effects)}: after {MOST_STEPS} "
+            f"fit of {_model(effects)}: after {MOST_STEPS} "
             f"steps the cost still falls by {promised:.2g}; the model does not fit these runs: "
             "look at them with `tirelib compare`",
             point,
@@ -359,8 +359,9 @@ def _ends(problem: Model, effects: Sequence[Effect], others: Sequence[Effect]) -
     return np.concatenate(lows), np.concatenate(highs)
 
 
-def _label(effects: Sequence[Effect]) -> str:
-    return f"fit of {', '.join(e.name for e in effects) or 'the base'}"
+def _model(effects: Sequence[Effect]) -> str:
+    names = " and ".join(effect.name for effect in effects)
+    return f"the model with {names}" if names else "the base model"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -137,11 +137,10 @@ class Hypotheses:
         """Return several hypotheses, each with the one from whose fit its own starts, as `at`."""
         new = {frozenset(names): (names, near) for names, near in wanted}
         new = {key: each for key, each in new.items() if key not in self._made}
-        if new and self.progress is not None:
-            self.progress(
-                f"fits with {'; '.join(' and '.join(names) for names, _ in new.values())}"
-            )
-        calls = [partial(self._alone, *each) for each in new.values()]
+        calls = [
+            partial(self._alone, f"{place} of {len(new)}", *each)
+            for place, each in enumerate(new.values(), 1)
+        ]
         shared = [*self.had, *self.effects.values(), *self.families]
         found = forked(calls, shared)
         self._made |= dict(zip(new, found, strict=True))
@@ -157,8 +156,9 @@ class Hypotheses:
         self._made[frozenset(self.added(hypothesis))] = out
         return out
 
-    def _alone(self, names: Sequence[str], near: Hypothesis) -> Hypothesis | None:
+    def _alone(self, place: str, names: Sequence[str], near: Hypothesis) -> Hypothesis | None:
         """Return a hypothesis from a fit nearby; None where no fit settles."""
+        self._told(f"trying effects, model {place}: with {' and '.join(names)}")
         more = [self.effects[name] for name in names]
         self.problem.forget()
         try:
@@ -231,15 +231,21 @@ class Hypotheses:
                     break  # a model that is far off has no whitening that is right
                 passed.append(fit.solved)
                 problem, fit = nearer, self._fit(nearer, near=fit, settled=ROUGH)
-            return passed, self._tested(problem, self._fit(problem, near=fit))
+            fit = self._fit(problem, near=fit)
+            self._told("testing what the model leaves against plain tires")
+            return passed, self._tested(problem, fit)
         except TirelibError as error:
             return error
 
     def _fit(self, problem: Problem, **how: Any) -> Posterior:
-        """Return the fit without further effects; a copy of the first process says nothing."""
-        progress = self.progress if os.getpid() == self._process else None
+        """Return the fit without further effects."""
         whiten = problem.whitener(self.own)
-        return posterior(problem, self.had, self.spread, whiten, progress=progress, **how)
+        return posterior(problem, self.had, self.spread, whiten, progress=self._told, **how)
+
+    def _told(self, label: str) -> None:
+        """Say what is done now; a copy of the first process says nothing."""
+        if self.progress is not None and os.getpid() == self._process:
+            self.progress(label)
 
     def _tested(self, problem: Problem, fit: Posterior) -> Hypothesis:
         had = len(self.had)

@@ -210,25 +210,27 @@ def error_line(told: Mapping[str, Any]) -> str:
     before, after = told["error_before"], told["error_after"]
     raw = f"{unit_name(told['residual_rms_unit'])} rms"
     left = [number(told[f"residual_rms_{when}"], SENSE) for when in ("before", "after")]
-    rms = [f" ({size} {raw})" if told["error_unit"] == "noise" else "" for size in left]
-    changed = told.get("named") or told.get("action")
-    if not changed:
-        text = f"It is {_said(before)} {unit}{rms[0]}"
-        text += _refitted(told)
-        return f"{text}.{_floor(told, after)}"
+    again = told.get("error_refitted")
+    anew = "" if not _known(again) or _said(again) == _said(before) else _said(again)
+    own = "the model's own numbers fitted anew"
+    noise = told["error_unit"] == "noise"
+    if not (told.get("named") or told.get("action")):
+        rms = f" ({left[0]} {raw})" if noise else ""
+        also = f", {anew} with {own}" if anew else ""
+        return f"It is {_said(before)} {unit}{rms}{also}.{_floor(told, after)}"
+    several = len(told.get("named", ())) > 1 and told.get("verdict") != "indistinguishable"
+    it = "them" if several else "it"
+    ways = ["with", "without"] if told.get("action") == "remove" else ["without", "with"]
     parted = after < before and told["residual_rms_after"] > told["residual_rms_before"]
-    rms = ["", ""] if parted else rms
-    text = f"It was {_said(before)} {unit}{rms[0]}{_refitted(told)}"
-    without = " without it" if told.get("action") == "remove" else " with it"
-    if len(told.get("named", ())) > 1 and told.get("verdict") != "indistinguishable":
-        without = " with them"
-    text += f", and is {_said(after)}{without}{rms[1]}.{_floor(told, after)}"
+    rms = f" ({left[0]} to {left[1]} {raw})" if noise and not parted else ""
+    said = f"It {_moves(before, after)} {unit} {ways[1]} {it}{rms}.{_floor(told, after)}"
     if parted:
-        text += (
+        said += (
             f" With the delay of the gages and the errors of the set points left in, {left[0]} "
             f"became {left[1]} {raw}."
         )
-    return f"{text} {held_out_line(told)}".strip()
+    said += f" {held_out_line(told)}"
+    return f"{said} {ways[0].title()} {it}, {own} leave {anew}." if anew else said
 
 
 def journey_explained(
@@ -284,10 +286,7 @@ def held_out_line(told: Mapping[str, Any]) -> str:
     if not _known(before) or not _known(after):
         return "Nothing could be held out of the fit to check it."
     if _fell(before, after):
-        fell = (
-            f"On what was held out of the fit it fell as well: {_said(before)} before, "
-            f"{_said(after)} after."
-        )
+        fell = f"On what was held out of the fit it {_moves(before, after)}."
         return " ".join([fell, *unmoved(told)])
     return " ".join(unmoved(told))
 
@@ -308,11 +307,11 @@ def _fell(before: float, after: float) -> bool:
     return after < before and _said(after) != _said(before)
 
 
-def _refitted(told: Mapping[str, Any]) -> str:
-    again = told.get("error_refitted")
-    if not _known(again) or _said(again) == _said(told["error_before"]):
-        return ""
-    return f", {_said(again)} with the model's own numbers fitted anew"
+def _moves(before: float, after: float) -> str:
+    """Return in words how an error changes."""
+    if _said(before) == _said(after):
+        return f"stays at {_said(after)}"
+    return f"{'falls' if after < before else 'rises'} from {_said(before)} to {_said(after)}"
 
 
 def _floor(told: Mapping[str, Any], after: float) -> str:
@@ -323,7 +322,7 @@ def _floor(told: Mapping[str, Any], after: float) -> str:
         if told.get("verdict") in ("unknown", "form_inadequate"):
             return " Noise and the structure of a tire can be as large, but not of this shape."
         return " All of that is noise and the structure of a tire."
-    return f" Noise and the structure of a tire explain {_said(floor)} of that."
+    return f" Noise and the structure of a tire explain {_said(floor)} of what is left."
 
 
 def _next(told: Mapping[str, Any], given: Sequence[str]) -> str:

@@ -26,9 +26,7 @@ NICE = 5
 one processor has a quarter of it; with 2 it would have 0.4, with 10 a tenth."""
 TAIL = 4000
 """Characters of a failed command's last words that are kept."""
-MOST_ERRORS = 400
-"""Points of the error's fall that a job keeps."""
-_ERROR = re.compile(r"\b(error|cost) (\d+(?:\.\d+)?(?:e[+-]?\d+)?)")
+_COST = re.compile(r"\bstep (\d+), cost (\d+(?:\.\d+)?(?:e[+-]?\d+)?)")
 
 
 @dataclass(slots=True)
@@ -72,17 +70,13 @@ class Job:
 
 @dataclass(slots=True)
 class Progress:
-    """How far a running job is: what it does, steps so far and in all, label, errors seen.
-
-    The errors are those that the labels name last: an ``error``, or the ``cost`` of a fit.
-    """
+    """What a running job does, steps so far and in all, their label, and the costs of its fit."""
 
     what: str = ""
     done: int = 0
     total: int | None = None
     label: str = ""
-    errors: list[float] = field(default_factory=list)
-    measure: str = ""
+    costs: list[float] = field(default_factory=list)
     rest: bytes = b""
     at: int = 0
 
@@ -105,9 +99,8 @@ class Progress:
             self.label = str(told["label"])
         except (ValueError, TypeError, KeyError):
             return False
-        if found := _ERROR.search(self.label):
-            before = self.errors[-MOST_ERRORS:] if found[1] == self.measure else []
-            self.measure, self.errors = found[1], [*before, float(found[2])]
+        if found := _COST.search(self.label):
+            self.costs = [*self.costs[: int(found[1]) - 1], float(found[2])]  # of this fit
         return True
 
 
@@ -152,9 +145,12 @@ class Jobs:
         self._save(job)
         return job
 
-    def look(self) -> tuple[list[Job], bool]:
-        """Start what may start; return the jobs that have just ended, and whether there is news."""
-        ended, news = [], False
+    def look(self) -> tuple[list[Job], bool, bool]:
+        """Start what may start.
+
+        Return the jobs that have just ended, whether any has begun, and whether any tells news.
+        """
+        ended, begun, news = [], False, False
         codes = self._starter.ended()
         for number in [*codes, *self._starter.running]:
             job, progress = self.all[number], self.progress[number]
@@ -168,8 +164,8 @@ class Jobs:
             room = AT_ONCE - sum(job.state == "running" for job in alike)
             for job in waiting[: max(0, room)]:
                 self._start(job)
-                news = True
-        return ended, news or bool(ended)
+                begun = True
+        return ended, begun, news
 
     def cancel(self, job: Job) -> None:
         """End a job at once."""

@@ -93,7 +93,7 @@ class Studio:
     async def _watch(self) -> None:
         """Look at the jobs at every tick."""
         while True:
-            just_now, news = self.desk.jobs.look()
+            just_now, begun, news = self.desk.jobs.look()
             ended = [*just_now, *self.desk.released()]
             for job in ended:
                 try:
@@ -103,9 +103,9 @@ class Studio:
             first = False
             with suppress(TirelibError, OSError):  # else its comparison comes with the whole fit
                 first = self.desk.first_fits()
-            if ended or first:
+            if changed := bool(ended) or begun or first:
                 self.changed += 1
-            if news or ended or first:
+            if news or changed:
                 self.wake()
             await asyncio.sleep(TICK)
 

@@ -138,8 +138,7 @@ def progress(desk: Desk) -> list[dict[str, Any]]:
             "done": p.done,
             "total": p.total,
             "label": p.label,
-            "errors": p.errors,
-            "measure": p.measure,
+            "costs": p.costs,
         }
         for job in desk.jobs.all.values()
         if job.state == "running" and (p := desk.jobs.progress.get(job.number)) is not None

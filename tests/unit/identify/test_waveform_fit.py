@@ -146,7 +146,7 @@ def test_more_runs_make_narrower_intervals(fitted: WaveformFit) -> None:
 
 def test_a_fit_that_does_not_settle_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(posterior, "MOST_STEPS", 1)
-    with pytest.raises(ConvergenceError, match="fit of the base: after 1 steps") as caught:
+    with pytest.raises(ConvergenceError, match="fit of the base model: after 1 steps") as caught:
         plain(data(loads=LOADS[::2]))
     assert np.isfinite(caught.value.iterate.base).all()
 
@@ -161,7 +161,7 @@ def test_progress_is_told() -> None:
         progress=said.append,
     )
     assert len(said) == fit.steps
-    assert all(word.startswith("fit of the base, cost ") for word in said)
+    assert all(word.startswith("fitting the base model, step ") for word in said)
 
 
 def test_what_large_displacements_add_vanishes_for_small_loads() -> None:

@@ -70,11 +70,25 @@ def test_what_is_named_is_told_with_its_size_its_fall_and_the_command_that_adds_
         "well."
     )
     assert told.error == (
-        "It was 30 times the noise (84.3 microstrain rms), 23.5 with the model's own numbers "
-        "fitted anew, and is 7.7 with it (37.6 microstrain rms). Noise and the structure of a "
-        "tire explain 7.1 of that. On what was held out of the fit it fell as well: 25.9 before, "
-        "9.9 after."
+        "It falls from 30 to 7.7 times the noise with it (84.3 to 37.6 microstrain rms). Noise and "
+        "the structure of a tire explain 7.1 of what is left. On what was held out of the fit it "
+        "falls from 25.9 to 9.9. Without it, the model's own numbers fitted anew leave 23.5."
     )
+    assert error_line(diagnosis(named=["damping", "shear"])).endswith(
+        "Without them, the model's own numbers fitted anew leave 23.5."
+    )
+    assert error_line(diagnosis(error_after=30.0)).startswith("It stays at 30 times the noise")
+
+
+def test_an_effect_that_is_taken_out_is_told_as_a_rise() -> None:
+    removed = diagnosis(action="remove", error_before=7.7, error_after=30.0, error_refitted=7.5)
+    told = error_line(removed | {"named": []})
+    assert told.startswith("It rises from 7.7 to 30 times the noise without it (84.3 to 37.6")
+    assert told.endswith("With it, the model's own numbers fitted anew leave 7.5.")
+
+
+def test_what_is_named_is_added_by_a_command_that_can_be_pasted() -> None:
+    told = explained(diagnosis(), "M.toml", "DIR")
     assert told.next.startswith("Add it: tirelib add damping --model M.toml --data DIR --out M2")
     spaced = explained(diagnosis(), "my M.toml", "a b", ["own law.py"])
     assert "--model 'my M.toml' --data 'a b' --effects 'own law.py' --out M2" in spaced.next
@@ -105,7 +119,7 @@ def test_an_effect_of_a_users_file_is_added_with_that_file() -> None:
 
 def test_a_plain_difference_that_rises_while_the_error_falls_is_told_with_its_reason() -> None:
     told = error_line(diagnosis(residual_rms_before=28.2, residual_rms_after=46.9))
-    assert "It was 30 times the noise, 23.5 with" in told
+    assert "It falls from 30 to 7.7 times the noise with it. Noise" in told
     assert "With the delay of the gages and the errors of the set points left in, 28.2" in told
     assert "became 46.9 microstrain rms" in told
     assert "left in" not in error_line(diagnosis())
@@ -120,7 +134,7 @@ def test_what_does_not_fall_on_what_was_held_out_is_said() -> None:
     assert unmoved(grown) == [
         "The error with the load 7506 N (12 runs) held out did not fall: 5 before, 7.1 after."
     ]
-    assert "fell as well" in held_out_line(grown)
+    assert "it falls from 25.9 to 9.9" in held_out_line(grown)
     assert unmoved(grown)[0] in held_out_line(grown)
     assert unmoved(diagnosis()) == []
     points = diagnosis(heldout_error_before=6.7, heldout_error_after=7.9, quantity="Fy")

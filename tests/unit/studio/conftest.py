@@ -44,7 +44,8 @@ class Served:
         self.socket = listener("127.0.0.1", 0)
         self.port = self.socket.getsockname()[1]
         self.host = f"127.0.0.1:{self.port}"
-        self.server = server_of(Studio(self.desk, TOKEN, "127.0.0.1", self.port))
+        self.studio = Studio(self.desk, TOKEN, "127.0.0.1", self.port)
+        self.server = server_of(self.studio)
         self.good = {"Host": self.host, "Cookie": f"tirelib-{self.port}={TOKEN}"}
         run = self.server.serve([self.socket])
         self.thread = threading.Thread(target=lambda: asyncio.run(run))

@@ -62,7 +62,7 @@ def work(words: Sequence[str]) -> None:
     if (first := value(words, "--first")) and held == "first":
         first.write_text("model = 0\n")
     for step in range(1, 100000):
-        label = f"error {9 - step}"
+        label = f"step {step + 1}, cost {9 - step}"
         told = {"progress": "fitting", "done": step, "total": None, "label": label}
         sys.stderr.write(json.dumps(told) + "\n")
         if verb not in slow or not hold.exists():

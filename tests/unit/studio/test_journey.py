@@ -166,10 +166,12 @@ def test_a_refit_does_not_wait_for_what_follows_by_itself(tmp_path: Path) -> Non
 
 def test_a_refit_is_cancelled_at_once_and_can_be_run_again(served: Served, opened: str) -> None:
     served.hold.touch()
+    changed = served.studio.changed
     served.do(do="add", campaign=opened, model="001", effects=["sidewall_load"])
+    until(lambda: served.studio.changed == changed + 2)  # the page is told that it has begun
     pid = until(lambda: [each["pid"] for each in served.said() if each["argv"][0] == "add"])[0]
     job = next(j for j in served.campaign(opened)["jobs"] if j["kind"] == "add")
-    until(lambda: served.desk.jobs.progress[job["job"]].errors)
+    until(lambda: served.desk.jobs.progress[job["job"]].costs)
     served.do(do="cancel", job=job["job"])
     assert not alive(pid)
     told = served.campaign(opened)
@@ -227,7 +229,7 @@ def test_what_nobody_has_asked_for_goes_on_after_a_restart(tmp_path: Path) -> No
 
 
 def test_the_fall_of_a_fit_is_read_from_its_steps(tmp_path: Path) -> None:
-    labels = ["error 3.5", "run 7", "error 2", "fit of the base, cost 45123", "the base, cost 1e3"]
+    labels = ["run 7", "step 1, cost 45123", "testing it", "step 2, cost 1e3", "step 1, cost 7"]
     lines = [
         json.dumps({"progress": "fitting", "done": k, "total": None, "label": label})
         for k, label in enumerate(labels)
@@ -235,10 +237,11 @@ def test_the_fall_of_a_fit_is_read_from_its_steps(tmp_path: Path) -> None:
     said, progress = tmp_path / "stderr.txt", Progress()
     said.write_text("\n".join(lines[:3]) + "\n")
     assert progress.read(said)
-    assert (progress.measure, progress.errors) == ("error", [3.5, 2.0])
-    said.write_text("\n".join(lines) + "\n")
-    assert progress.read(said)
-    assert (progress.measure, progress.errors) == ("cost", [45123.0, 1000.0])
+    assert (progress.label, progress.costs) == ("testing it", [45123.0])
+    for count, costs in ((4, [45123.0, 1000.0]), (5, [7.0])):  # the last begins another fit
+        said.write_text("\n".join(lines[:count]) + "\n")
+        assert progress.read(said)
+        assert progress.costs == costs
 
 
 def add_that_goes_on(folder: Path) -> tuple[Jobs, int]:

@@ -115,7 +115,8 @@ class ForceModels:
         """Return the errors of a model on each fold's points after a fit to the others, SI."""
         if fit not in self._held:
             if self.progress is not None:
-                self.progress("held-out points")
+                count = len(self.folds)
+                self.progress(f"holding out some of the points: {count} fits to the others")
             self._held[fit] = errors_of(self.problem, fit, self.folds)
         return self._held[fit]
 

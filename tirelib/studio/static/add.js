@@ -1,6 +1,6 @@
 // Step 4: the refit while it runs, the fall of the error, and every model that was made.
 import { compareModels } from "./compare.js";
-import { app, current, failedOf, nameOf, progressOf, verdictOf, wish } from "./data.js";
+import { app, current, failedOf, nameOf, progressOf, stepOf, verdictOf, wish } from "./data.js";
 import { csvButton, fill, h, number, strength, unitName } from "./dom.js";
 import { Plot, waterfall } from "./plots.js";
 
@@ -10,17 +10,15 @@ const FLAGS = {
   heldout_worse: "On a part of the runs that was held out the error rose: there the effect may stand for another one.",
 };
 
-// What falls while a fit runs, as its steps tell it.
-const MEASURES = { error: { title: "weighted residual of the fits, step by step: of all runs, then with parts held out", unit: "weighted residual [1]" }, cost: { title: "cost of the fit, step by step: the squares of what is left, weighted by noise and scatter", unit: "cost [1]" } };
-
 // Why there is no verdict of the model yet, or none at all.
 function noVerdict(c) {
   const broken = failedOf("compare") || failedOf("diagnose");
   return broken ? h("p", { class: "warn" }, `${broken.title}: ${broken.state}. ${broken.message} `, h("a", { href: `#/suspect/${c.campaign}` }, "What can be done next")) : h("p", { class: "quiet" }, "The verdict of this model is being computed.");
 }
 
-// What was held out, part by part, in a sentence.
-const heldOut = (fit) => (fit.held_out || []).map((part) => `${part.condition.replaceAll("_", " ")} ${number(part.value, 3)} ${part.unit || ""} (${part.runs} runs): ${number(part.error_before, 3)} before, ${number(part.error_after, 3)} after`).join("; ");
+// What was held out, part by part.
+const partOf = ({ condition, value, unit }) => ({ time: `part ${value} of the time`, cell: `part ${value} of the conditions` })[condition] || `${condition.replaceAll("_", " ")} ${number(value, 3)} ${unit || ""}`;
+const heldOut = (fit) => h("details", { class: "small" }, h("summary", {}, "Held out, part by part"), h("ul", {}, fit.held_out.map((part) => h("li", {}, `${partOf(part)} (${part.runs ? `${part.runs} runs` : `${part.points} points`}): ${number(part.error_before, 3)} before, ${number(part.error_after, 3)} after`))));
 
 export class Add {
   constructor(go) {
@@ -42,8 +40,8 @@ export class Add {
   progress() {
     const job = this.fitting().find((one) => one.state === "running"), at = job && progressOf(job.job);
     if (!at || !this.text) return;
-    this.text.textContent = at.label ? `${at.label} (step ${at.done})` : "begins";
-    if (at.errors.length > 1) this.plot.show({ ...MEASURES[at.measure], x: { title: "step", whole: true, values: at.errors.map((_, i) => i + 1) }, series: [{ name: at.measure, values: at.errors, color: "model" }] });
+    this.text.textContent = stepOf(job);
+    if (at.costs.length > 1) this.plot.show({ title: "cost of this fit, step by step: the squares of what is left, weighted by noise and scatter", unit: "cost [1]", x: { title: "step", whole: true, values: at.costs.map((_, i) => i + 1) }, series: [{ name: "cost", values: at.costs, color: "model" }] });
   }
 
   update() {
@@ -53,7 +51,7 @@ export class Add {
     if (key !== this.jobsKey) {
       this.jobsKey = key;
       fill(this.running, fitting.map((job) => h("div", { class: "card" }, h("div", { class: "row" },
-        h("h2", {}, job.kind === "identify" ? "The base model is fitted" : `${job.kind === "add" ? "Adding" : "Removing"} ${job.effect}${job.then.length ? `, then ${job.then.join(", ")}` : ""}`), job.state === "running" ? (this.text = h("span", { class: "quiet", role: "status" }, "begins")) : h("span", { class: "quiet" }, "waits"), h("span", { class: "room" }),
+        h("h2", {}, job.kind === "identify" ? "The base model is fitted" : `${job.kind === "add" ? "Adding" : "Removing"} ${job.effect}${job.then.length ? `, then ${job.then.join(", ")}` : ""}`), job.state === "running" ? (this.text = h("span", { class: "quiet", role: "status" }, stepOf(job))) : h("span", { class: "quiet" }, stepOf(job)), h("span", { class: "room" }),
         h("button", { type: "button", "data-cancel": job.job, onclick: () => wish({ do: "cancel", job: job.job }) }, "Cancel")), job.state === "running" ? this.plot.element : null, h("pre", { class: "small" }, job.command))));
       this.progress();
     }
@@ -86,7 +84,8 @@ export class Add {
     fill(this.fall, h("div", { class: "row" }, h("h2", {}, "The fall of the error"), h("span", { class: "quiet" }, c.quantity), h("span", { class: "room" }),
       csvButton("waterfall", () => [["step", steps.map((s) => s.name)], [`error [${unit}]`, steps.map((s) => s.error)], ["held-out error", steps.map((s) => s.heldout)], ["floor", steps.map((s) => s.floor)]])),
     steps.length ? waterfall(steps, unit) : h("p", { class: "quiet" }, "There is no model yet."),
-    last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(last.std, 2)}${last.unit === "1" ? "" : ` ${unitName(last.unit)}`}. Error ${number(last.error_before, 4)} before, `, h("b", { id: "error-after" }, number(last.error_after, 4)), ` after [${unitName(last.error_unit)}]. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after${last.held_out?.length ? `; of it ${heldOut(last)}` : ""}.`) : null,
+    last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(last.std, 2)}${last.unit === "1" ? "" : ` ${unitName(last.unit)}`}. Error ${number(last.error_before, 4)} before, `, h("b", { id: "error-after" }, number(last.error_after, 4)), ` after [${unitName(last.error_unit)}]. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after.`) : null,
+    last?.held_out?.length ? heldOut(last) : null,
     last?.flags?.length ? h("p", { class: "warn" }, last.flags.map((flag) => FLAGS[flag] || flag.replaceAll("_", " ")).join(" ")) : null,
     now?.verdict ? h("p", {}, "The verdict with this model: ", h("b", {}, verdictOf(now.verdict, now.error_unit, now.named)), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", h("a", { href: `#/suspect/${app.wanted}` }, "See the suspects again")) : now ? noVerdict(c) : null,
     failed.map((job) => h("p", { class: job.state === "failed" ? "bad" : "warn" }, `${job.kind} ${job.effect}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: job.job }) }, "Run again"))));

@@ -66,6 +66,7 @@ const NUMBERS = ["no", "one", "two", "three", "four", "five"];
 export function verdictOf(verdict, unit, named = []) {
   if (verdict && unit && unit !== "noise") return "not tested: nothing was measured twice";
   if (verdict === "named" && named.length > 1) return `${NUMBERS[named.length] || named.length} effects are missing`;
+  if (verdict === "form_inadequate" && named.length > 1) return "the effects are right, one of their laws is not";
   return VERDICTS[verdict] || verdict;
 }
 
@@ -92,8 +93,6 @@ export function nameOf(model) {
 // Jobs of the campaign or of none that wait or run.
 export const active = () => [...(app.campaign?.jobs || []), ...(app.home?.jobs || [])]
   .filter((job) => ["waiting", "running"].includes(job.state));
-// What a job says of its last step; while a fit runs, its error is weighted otherwise than the error of a model.
-export const labelOf = (at) => at?.label.replace(/^error /, "weighted residual ");
 // How long a job has run, and how long it may still take if the last one of its kind in this campaign is a guide.
 export function timeOf(job) {
   if (!job.begun || job.state !== "running") return "";
@@ -102,6 +101,12 @@ export function timeOf(job) {
   return `${words(Math.max(0, took))}${left > 1 ? `, about ${words(left)} left if it takes as long as the last time` : ""}`;
 }
 export const progressOf = (number) => app.running.find((one) => one.job === number);
+// What a job does now and how long it has run; the cost of a fit is drawn, not told.
+export function stepOf(job) {
+  if (job.state !== "running") return "waits until another job has ended";
+  const at = progressOf(job.job);
+  return [at?.label.replace(/, cost \S+$/, "") || at?.what || "the program is loading", timeOf(job)].filter(Boolean).join("; ");
+}
 
 // What the check tells better: runs that cannot be read, and a base fit that ended with them.
 export const isFinding = (job) => ["show", "identify"].includes(job.kind) && (!app.campaign?.check || app.campaign.check.errors > 0);

@@ -32,7 +32,7 @@ function panels(list, data) {
 // found: what next-test has written; said: its sentence; data: the plan as the map has it.
 export function nextRun(found, said, data) {
   const list = (found.candidates || []).slice(0, BEST), plots = panels(list, data);
-  const element = h("div", { id: "next-run" }, h("h3", {}, "The next run"), h("p", {}, said.charAt(0).toUpperCase() + said.slice(1)),
+  const element = h("div", { id: "next-run" }, h("h3", {}, "The next run"), h("p", {}, said.charAt(0).toUpperCase() + said.slice(1).replaceAll(/ \(`tirelib [^`]*`\)/g, "")),
     list.length ? [h("p", { class: "quiet small" }, "The best runs, best first:"), h("ol", {}, list.map((run) => h("li", {}, words(run)))), h("div", { class: "two" }, plots.map((plot) => plot.element))] : null);
   return { element, remove: () => plots.forEach((plot) => plot.remove()) };
 }

@@ -81,7 +81,7 @@ export function waterfall(steps, unit) {
     if (text !== undefined) one.textContent = text;
     return one;
   };
-  const width = 760, height = 250, left = 56, bottom = 52, top = 16;
+  const width = 760, height = 263, left = 56, bottom = 65, top = 16;
   const every = steps.flatMap((step) => [step.error, step.heldout]).filter(Number.isFinite);
   const high = 1.12 * Math.max(...every, 1e-9), up = (value) => height - bottom - ((height - bottom - top) * value) / high;
   const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, class: "waterfall", role: "img", "aria-label": `Error by step: ${steps.map((s) => `${s.name} ${number(s.error)}`).join(", ")} ${unit}` });
@@ -101,7 +101,9 @@ export function waterfall(steps, unit) {
       const [cx, cy] = [x + wide + 12, up(step.heldout)];
       svg.append(make("path", { d: `M${cx} ${cy - 6}l6 6-6 6-6-6z`, fill: "var(--card)", stroke: "var(--rest)", "stroke-width": 2 }), make("text", { x: cx + 9, y: cy + 4, "font-size": 12, fill: "var(--rest)" }, number(step.heldout)));
     }
-    svg.append(make("text", { x: x + wide / 2, y: height - bottom + 16, "text-anchor": "middle", "font-size": 12, fill: "var(--text)" }, step.name), make("text", { x: x + wide / 2, y: height - bottom + 32, "text-anchor": "middle", "font-size": 11, fill: "var(--quiet)" }, step.note || ""));
+    const words = 7 * step.name.length > room ? step.name.split(/(?<=_)/) : [step.name]; // a name that is too wide is broken
+    words.forEach((word, k) => svg.append(make("text", { x: x + wide / 2, y: height - bottom + 16 + 13 * k, "text-anchor": "middle", "font-size": 12, fill: "var(--text)" }, word)));
+    svg.append(make("text", { x: x + wide / 2, y: height - bottom + 19 + 13 * words.length, "text-anchor": "middle", "font-size": 11, fill: "var(--quiet)" }, step.note || ""));
   });
   svg.append(make("text", { x: 8, y: height - 6, "font-size": 12, fill: "var(--quiet)" }, `error [${unit}]: bar fitted runs, diamond held-out runs, dotted line what noise and structure explain`));
   return svg;

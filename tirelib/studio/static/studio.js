@@ -1,5 +1,5 @@
 // The frame: steps, campaign, quantity, jobs; the view of the step that the address names.
-import { active, app, connect, current, inView, isFinding, labelOf, listen, nameOf, progressOf, refresh, tell, timeOf, wish } from "./data.js";
+import { active, app, connect, current, inView, isFinding, listen, nameOf, progressOf, refresh, stepOf, tell, wish } from "./data.js";
 import { h, fill, toast } from "./dom.js";
 import { entries, Open, receive } from "./open.js";
 import { See } from "./see.js";
@@ -56,9 +56,9 @@ function jobs() {
       h("button", { class: "small", type: "button", onclick: () => wish({ do: "cancel", job: job.job }) }, "Cancel"))));
   }
   for (const box of place.children) {
-    const number = Number(box.dataset.job), at = progressOf(number), bar = box.querySelector("progress");
+    const job = shown.find((one) => one.job === Number(box.dataset.job)), at = progressOf(job.job), bar = box.querySelector("progress");
     if (at?.total) { bar.max = at.total; bar.value = Math.min(at.done, at.total); } else bar.removeAttribute("value");
-    box.querySelector("[data-label]").textContent = at ? [labelOf(at) || (at.done ? `step ${at.done}` : "begins"), timeOf(shown.find((job) => job.job === number))].filter(Boolean).join("; ") : "waits";
+    box.querySelector("[data-label]").textContent = stepOf(job);
   }
 }
 
@@ -106,7 +106,7 @@ listen((what) => {
     if (app.home.first && !address().campaign) { go("see", app.home.first); return; }
   }
   for (const job of [...(app.campaign?.jobs || []), ...app.home.jobs]) {
-    if (job.state === "failed" && !isFinding(job) && job.ended > begun && !told.has(job.job)) { told.add(job.job); toast(`${job.title}: ${job.message}`, true); }
+    if (job.state === "failed" && !isFinding(job) && !["columns", "suggest", "import"].includes(job.kind) /* their form tells it */ && job.ended > begun && !told.has(job.job)) { told.add(job.job); toast(`${job.title}: ${job.message}`, true); }
   }
   if (app.follow && app.home) {
     const found = app.home.jobs.find((job) => job.job === app.follow);

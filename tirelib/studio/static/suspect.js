@@ -84,7 +84,7 @@ export class Suspect {
       told.false_alarm !== undefined && told.false_alarm !== null ? h("span", { class: "quiet small" }, `chance of a false alarm: ${number(100 * told.false_alarm, 2)} %`) : null, h("span", { class: "room" }),
       told.named.length && !alike ? h("button", { type: "button", id: "tick-named", onclick: () => { for (const box of this.list.querySelectorAll("input[data-effect]")) if (told.named.includes(box.dataset.effect) && !box.checked) box.click(); this.button.focus(); } }, told.named.length > 1 ? "Tick what is named" : "Tick it") : null,
       h("button", { type: "button", onclick: () => wish({ do: "next-test", ...this.where() }).then(() => toast("The next run is being looked for.")) }, apart ? "What would tell them apart?" : "Which run to measure next?")),
-    h("dl", { class: "verdict" }, (model.lines || []).map(([what, said]) => [h("dt", {}, TITLES[what] || what), h("dd", {}, plain(said, model), what === "next" && told.named.length && !alike ? h("span", { class: "quiet" }, ` Here: tick ${told.named.length > 1 ? "them" : "it"} in the list below and press Add.`) : null)])),
+    h("dl", { class: "verdict" }, (model.lines || []).map(([what, said]) => [h("dt", {}, TITLES[what] || what), h("dd", {}, what === "next" && told.named.length && !alike ? [`Tick ${told.named.length > 1 ? "them" : "it"} in the list below and press Add; the new model is then diagnosed by itself. `, h("details", { class: "small quiet" }, h("summary", {}, "By hand"), plain(said, model))] : plain(said, model))])),
     this.nextRun?.element);
   }
 
