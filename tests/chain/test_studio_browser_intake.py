@@ -133,7 +133,11 @@ def test_files_that_are_no_runs_and_wrong_units_are_told_before_the_import(
 ) -> None:
     rows = "".join(f"{0.1 * k:.1f},{4 + k % 3},{60 + k},198.{k}\n" for k in range(5))
     table = f"time [s],Fz [kN],speed [km/h],loaded_radius [mm]\n{rows}"
-    texts = {"1.csv": table, "2.csv": table.replace("60", "61"), "3.csv": table[: table.find("0.1,")]}
+    texts = {
+        "1.csv": table,
+        "2.csv": table.replace("60", "61"),
+        "3.csv": table[: table.find("0.1,")],
+    }
     texts |= {"typo.csv": table.replace("62", "6,2"), "notes.txt": "A tire.\n"}
     (tmp_path / "lab").mkdir()
     for name, text in texts.items():

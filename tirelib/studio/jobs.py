@@ -157,6 +157,7 @@ class Jobs:
             news |= progress.read(self.place(job) / "stderr.txt")
             if number in codes:
                 self._finish(job, codes[number])
+                del self.progress[number]
                 ended.append(job)
         for asked in (True, False):
             alike = [job for job in self.all.values() if (job.kind in ASKED) == asked]
@@ -173,6 +174,7 @@ class Jobs:
             return
         job.state, job.ended = "cancelled", time.time()
         self._starter.end(job.number)
+        self.progress.pop(job.number, None)
         self._save(job)
 
     def close(self) -> None:

@@ -1,6 +1,6 @@
 """What the page is told of a session: lists for all views, without the documents themselves."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -165,7 +165,7 @@ def _model(model: Model, quantity: str) -> dict[str, Any]:
         **model.told,
         "ready": model.ready,
         "fit": fit,
-        "advice": advice(_part(model.place / "fit.json", _ADVISES)),
+        "advice": _part(model.place / "fit.json", _ADVISES, advice),
         "error": compared.get("error"),
         "error_unit": compared.get("error_unit"),
         "effects": compared.get("effects", []),
@@ -193,18 +193,18 @@ _FIT = (
 _ADVISES = ("messages", "reasons", "parameters", "brush")
 _COMPARED = ("error", "error_unit", "effects")
 _DIAGNOSED = ("verdict", "named", "floor", "explanation")
-_known: dict[tuple[Path, Sequence[str]], tuple[float, dict[str, Any]]] = {}
+_known: dict[tuple[Path, Sequence[str]], tuple[float, Any]] = {}
 
 
-def _part(path: Path, keys: Sequence[str]) -> dict[str, Any]:
-    """Return some keys of a document, which is read again only when it has changed."""
+def _part(path: Path, keys: Sequence[str], of: Callable[[dict[str, Any]], Any] = dict) -> Any:
+    """Return what follows from keys of a document, which is read again only if it has changed."""
     stamp = _stamp(path)
     if stamp is None:
-        return {}
+        return of({})
     part = path, keys
     if part not in _known or _known[part][0] != stamp:
         told = read_document(path) or {}
-        _known[part] = stamp, {key: told[key] for key in keys if key in told}
+        _known[part] = stamp, of({key: told[key] for key in keys if key in told})
     return _known[part][1]
 
 

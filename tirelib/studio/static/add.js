@@ -102,7 +102,7 @@ export class Add {
     const name = h("input", { value: m.label, placeholder: nameOf(m), "aria-label": `label of model ${m.number}`, size: 16, onchange: () => mark({ label: name.value }) });
     const before = c.models.find((one) => one.number === m.parent);
     return h("div", { class: `model${m.number === c.current ? " current" : ""}${m.hidden ? " hidden-model" : ""}`, "data-model": m.number },
-      h("div", { class: "name" }, nameOf(m), m.pinned ? [" ", h("span", { class: "tag" }, "pinned")] : null), h("div", { class: "small quiet" }, before ? `from ${nameOf(before)}` : "the start"),
+      h("div", { class: "name" }, nameOf(m), m.pinned ? [" ", h("span", { class: "tag" }, "pinned")] : null), h("div", { class: "small quiet" }, before ? `made of: ${nameOf(before)}` : "the start"),
       h("div", {}, `error ${number(m.error ?? m.fit?.error_after)} `, h("span", { class: "quiet" }, unitName(m.error_unit || m.fit?.error_unit))), name,
       h("div", { class: "row" }, m.number === c.current ? h("span", { class: "tag" }, "shown") : h("button", { class: "small", type: "button", onclick: () => this.look(m) }, "Continue from here"),
         h("button", { class: "small", type: "button", onclick: () => mark({ pinned: !m.pinned }) }, m.pinned ? "Unpin" : "Pin"), h("button", { class: "small", type: "button", onclick: () => mark({ hidden: !m.hidden }) }, m.hidden ? "Show" : "Hide")));

@@ -70,8 +70,8 @@ export function verdictOf(verdict, unit, named = []) {
   return VERDICTS[verdict] || verdict;
 }
 
-// What a command has said of a model, with the file as step 5 calls it in the place of that of the session.
-export const plain = (said, model) => said.replaceAll(model.file, model.saved_as).replaceAll("--out M2.toml", `--out ${model.next_as}`);
+// What a command has said of a model, with the file as step 5 calls it in the place of that of the session, and effects as the page takes them.
+export const plain = (said, model) => said.replaceAll(model.file, model.saved_as).replaceAll("--out M2.toml", `--out ${model.next_as}`).replaceAll("(--effects)", "(step 5 has an example)");
 
 // A statement with its wheel angles in degrees, as the plots beside it have them.
 export const inDegrees = (said) => said.replace(/from (-?[\d.]+) to (-?[\d.]+) rad\b/g, (_, ...ends) => `from ${ends.slice(0, 2).map((x) => Math.round((180 / Math.PI) * x)).join(" to ")} deg`);
