@@ -251,8 +251,8 @@ static void write_core(Source *s, const char *path) {
 
 /* Calls of FMI in any order, on whole or damaged resources. */
 static void try_fmi(Source *s) {
-    static const char *const TEXTS[] = {"", "iso", "sae", "adapted_sae", "live tire", "%s%n", "/nowhere"};
-    char path[4200], uri[64];
+    char path[4200], other[4300], uri[64];
+    const char *texts[] = {"", "iso", "sae", "adapted_sae", "live tire", "%s%n", "/nowhere", other};
     fmi2CallbackFunctions host = {said, NULL, NULL, NULL, NULL};
     fmi2FMUstate state = NULL;
     fmi2String guid = own.guid, text;
@@ -263,6 +263,7 @@ static void try_fmi(Source *s) {
         snprintf(name, sizeof name, "%s/StrainTire.core", path);
         write_core(s, name);
     }
+    snprintf(other, sizeof other, "%s/StrainTire.core", path); /* as another calibration */
     for (size_t i = 0; i < sizeof uri - 1; i++) uri[i] = (char)byte_of(s);
     uri[sizeof uri - 1] = 0;
     fmi2FreeInstance(fmi2Instantiate("w", fmi2CoSimulation, guid, uri, &host, 0, 0));
@@ -272,7 +273,7 @@ static void try_fmi(Source *s) {
         unsigned r = byte_of(s) < 240 ? (unsigned)place_of(s, own.variables + 2) : ~0u;
         double real = number_of(s, 1.0);
         int whole = (int)byte_of(s) - 20;
-        text = TEXTS[byte_of(s) % 7];
+        text = texts[byte_of(s) % 8];
         switch (byte_of(s) % 12) {
         case 0: fmi2SetReal(c, &r, 1, &real); break;
         case 1: fmi2SetInteger(c, &r, 1, &whole); break;
