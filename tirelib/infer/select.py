@@ -138,7 +138,7 @@ class Hypotheses:
         new = {frozenset(names): (names, near) for names, near in wanted}
         new = {key: each for key, each in new.items() if key not in self._made}
         calls = [
-            partial(self._alone, f"{place} of {len(new)}", *each)
+            partial(self._alone, f", {place} of {len(new)}" if len(new) > 1 else "", *each)
             for place, each in enumerate(new.values(), 1)
         ]
         shared = [*self.had, *self.effects.values(), *self.families]
@@ -158,7 +158,7 @@ class Hypotheses:
 
     def _alone(self, place: str, names: Sequence[str], near: Hypothesis) -> Hypothesis | None:
         """Return a hypothesis from a fit nearby; None where no fit settles."""
-        self._told(f"trying effects, model {place}: with {' and '.join(names)}")
+        self._told(f"trying the model with {' and '.join(names)}{place}")
         more = [self.effects[name] for name in names]
         self.problem.forget()
         try:

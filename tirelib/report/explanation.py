@@ -321,7 +321,7 @@ def _floor(told: Mapping[str, Any], after: float) -> str:
     if _said(floor) == _said(after):
         if told.get("verdict") in ("unknown", "form_inadequate"):
             return " Noise and the structure of a tire can be as large, but not of this shape."
-        return " All of that is noise and the structure of a tire."
+        return " All that is left is noise and the structure of a tire."
     return f" Noise and the structure of a tire explain {_said(floor)} of what is left."
 
 

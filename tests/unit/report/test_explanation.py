@@ -245,7 +245,7 @@ def test_without_a_name_one_error_is_told() -> None:
     told = explained(diagnosis(verdict="none", named=[], error_after=23.5, floor=23.5))
     assert told.error == (
         "It is 30 times the noise (84.3 microstrain rms), 23.5 with the model's own numbers fitted "
-        "anew. All of that is noise and the structure of a tire."
+        "anew. All that is left is noise and the structure of a tire."
     )
     assert "No further run" in told.next
     odd = explained(diagnosis(verdict="unknown", named=[], error_after=23.5, floor=23.5, p=0.03))

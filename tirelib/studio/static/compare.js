@@ -18,7 +18,7 @@ function mapOf(data, limit) {
 }
 
 const LINES = [
-  ["error", (t) => t && `${number(t.error, 4)} ${unitName(t.error_unit)}`],
+  ["error", (t, m) => (t || m.fit?.error_after) && `${number(t?.error ?? m.fit.error_after, 4)} ${unitName((t || m.fit).error_unit)}`],
   ["not explained, rms", (t) => t && `${number(t.residual_rms)} ${unitName(t.unit)}`],
   ["effects", (t) => t && (t.effects.map((e) => `${e.effect} ${strength(e.strength)}`).join("; ") || "none")],
   ["verdict", (_, m) => verdictOf(m.verdict, m.error_unit, m.named)],
@@ -40,17 +40,18 @@ const change = (x, y) => (x && y ? (y < x ? "▼ lower" : y > x ? "▲ higher" :
 
 export function compareModels(c, models) {
   const last = models.at(-1).number, right = c.current !== models[0].number ? c.current : last;
-  const pick = [c.models.find((m) => m.number === right)?.parent ?? models[0].number, right], body = h("div", {});
+  const known = models.filter((m) => m.number < right && m.documents[`${c.quantity}/plots.npz`]); // of several effects at once only the last model is
+  const pick = [(known.at(-1) || models[0]).number, right], body = h("div", {});
   const options = models.map((m) => [m.number, `${m.number} ${nameOf(m)}`]);
   const heats = ["left", "right"].map((side) => new Heat(`Map of what the ${side} model leaves`, { height: 240, choose: (at) => { for (const heat of heats.filter((one) => one.map)) { heat.at = { ...at }; heat.say(heat.at); heat.draw(); } } }));
   const draw = async () => {
     const both = pick.map((n) => c.models.find((m) => m.number === n));
     const [told, arrays] = await Promise.all([documentOf, arraysOf].map((of, k) => Promise.all(both.map((m) => of(m, ["comparison", "plots"][k], c.quantity).catch(() => null)))));
-    const limit = Math.max(...arrays.filter(Boolean).map((data) => limitOf(data.difference)));
+    const each = parts(told), limit = Math.max(...arrays.filter(Boolean).map((data) => limitOf(data.difference)));
     fill(body, h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), both.map((m) => h("th", {}, nameOf(m))))), h("tbody", {}, LINES.map(([text, value]) => h("tr", {}, h("td", {}, text), both.map((m, i) => h("td", {}, value(told[i], m) || "–")))))),
       h("h3", {}, `What each leaves: model less measured${arrays[0] || arrays[1] ? ` [${unitOf(arrays[0] || arrays[1])}]` : ""}, one scale`),
       h("div", { class: "two" }, both.map((m, i) => h("div", {}, h("div", { class: "row small" }, nameOf(m), h("span", { class: "room" }), arrays[i] ? csvButton(`map-${m.number}`, () => heats[i].columns(isStrain(arrays[i]) ? 0 : 0.5)) : null), arrays[i] ? heats[i].element : h("p", { class: "quiet" }, "It has not been compared yet: continue from it once.")))),
-      h("h3", {}, "Each run, rms over the noise"), h("table", {}, h("tbody", {}, parts(told).map(([name, [x, y]]) => h("tr", {}, h("td", {}, name), h("td", { class: "n" }, number(x)), h("td", { class: "n" }, number(y)), h("td", { class: y < x ? "good" : "warn" }, change(x, y)))))));
+      each.length ? h("h3", {}, "Each run, rms over the noise") : null, h("table", {}, h("tbody", {}, each.map(([name, [x, y]]) => h("tr", {}, h("td", {}, name), h("td", { class: "n" }, number(x)), h("td", { class: "n" }, number(y)), h("td", { class: y < x ? "good" : "warn" }, change(x, y)))))));
     arrays.forEach((data, i) => data && heats[i].show(mapOf(data, limit)));
   };
   const side = (i) => choose(options, pick[i], (picked) => { pick[i] = picked; draw(); }, ["left", "right"][i]);
