@@ -80,13 +80,10 @@ def walk(page: Any, campaign: str | None, picture: Any) -> dict[str, float]:
     page.click("#add")  # click 4
     clicks += 3
     took["first progress"] = wait(page, "studio.running.some(job => job.what === 'fitting')")
-    wait(
-        page,
-        "studio.running.some(job => job.costs.length > 6) || studio.campaign.current !== '001'",
-    )
     took["added"] = wait(page, "studio.campaign.current === '002'")
     page.wait_for_selector("#error-after")
     wait(page, "!!studio.campaign.models[1].verdict")
+    wait(page, "studio.campaign.jobs.every(job => !!job.ended)")
     page.wait_for_timeout(500)
     picture("add")
     took["clicks"] = clicks
