@@ -81,6 +81,8 @@ class Effect:
     exact : bool
         Whether the law is a definition, such as where an angle has its zero, which no tire can
         follow otherwise. All other laws are only roughly right.
+    start : tuple of float
+        Strength from which a fit starts, where at zero it could go either way; zero if empty.
     """
 
     name: str
@@ -96,6 +98,7 @@ class Effect:
     needs: tuple[str, ...] = ()
     untestable: str = ""
     exact: bool = False
+    start: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         faults = []
@@ -121,6 +124,8 @@ class Effect:
             )
         if not (isinstance(self.components, int) and self.components >= 1):
             faults.append(f"components {self.components!r}; a whole number from 1 on is needed")
+        elif len(self.start) not in (0, self.components):
+            faults.append(f"start {self.start!r}; it needs {self.components} numbers, or none")
         if faults:
             raise ParameterError(f"effect {self.name!r}, {self.origin}: " + "; ".join(faults))
 
@@ -256,6 +261,7 @@ def effect(
     needs: tuple[str, ...] = (),
     untestable: str = "",
     exact: bool = False,
+    start: tuple[float, ...] = (),
 ) -> Callable[[Law], Effect]:
     """Make an effect of a law; its docstring's first line is the title.
 
@@ -285,6 +291,7 @@ def effect(
             tuple(needs),
             untestable,
             exact,
+            start,
         )
 
     return make

@@ -135,6 +135,10 @@ class Posterior:
         pairs = zip(self.point.effects, self.point.strengths, strict=True)
         return next((strength for effect, strength in pairs if effect.name == name), None)
 
+    def begins(self, effect: Effect) -> bool:
+        """Return whether a fit nearby that adds this effect starts it elsewhere than here."""
+        return bool(effect.start) and effect.name not in self.names
+
     def slopes_at(self, point: Point) -> FloatArray:
         """Return the slopes of this fit by the coordinates of a point with the same effects."""
         base, first = len(self.point.base), len(self.point.base)
@@ -210,10 +214,12 @@ def posterior(
     """
     names = {effect.name for effect in effects}
     others = [effect for effect in problem.living if effect.name not in names]
-    point = _start(problem, [*effects, *others], near, start)
+    point = _start(problem, effects, others, near, start)
     width, ends = _widths(problem, effects, others, spread), _ends(problem, effects, others)
     solved = problem.solve(point, near.solved if near else None)
-    known = None if near is None or start is not None else near.slopes_at(point)
+    known = None
+    if near is not None and start is None and not any(map(near.begins, effects)):
+        known = near.slopes_at(point)
     slopes = problem.slopes(point, solved) if known is None else known
     exact = known is None or (near is not None and near.point.effects == point.effects)
     whitened, rest = _white(whiten, problem.remainder(point, solved)), whiten(solved.rest)
@@ -298,7 +304,7 @@ def explaining(
 
 def sizes_at_start(problem: Model) -> dict[str, float]:
     """Return mean squares of rows as `Posterior.sizes`, of the model where a fit starts."""
-    point = _start(problem, [*problem.start.effects, *problem.living], None, problem.start)
+    point = _start(problem, (), [*problem.start.effects, *problem.living], None, problem.start)
     solved = problem.solve(point)
     rows, _ = explaining(problem, point, solved, len(problem.start.effects))
     return _sizes(rows, problem.start.effects)
@@ -322,16 +328,22 @@ def _white(whiten: Whiten, rows: Mapping[str, FloatArray]) -> dict[str, FloatArr
 
 
 def _start(
-    problem: Model, effects: Sequence[Effect], near: Posterior | None, start: Point | None
+    problem: Model,
+    effects: Sequence[Effect],
+    others: Sequence[Effect],
+    near: Posterior | None,
+    start: Point | None,
 ) -> Point:
     """Return the point from which a fit starts."""
-    given = list(start.strengths if start else ())
-    for effect in effects[len(given) :]:
+    given, every = list(start.strengths if start else ()), [*effects, *others]
+    for k, effect in enumerate(every[len(given) :], len(given)):
         known = None if near is None else near.strength(effect.name)
+        if k < len(effects) and effect.start and (near is None or near.begins(effect)):
+            known = np.array(effect.start)
         given.append(np.zeros(effect.components) if known is None else known)
     if start is None:
         start = problem.start if near is None else near.point
-    return Point(start.base, tuple(effects), tuple(np.array(s, dtype=float) for s in given))
+    return Point(start.base, tuple(every), tuple(np.array(s, dtype=float) for s in given))
 
 
 def coordinates_of(point: Point) -> FloatArray:

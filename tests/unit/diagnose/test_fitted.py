@@ -28,8 +28,8 @@ from tirelib.problems.strain import WIDTH, StrainProblem
 from tirelib.waveforms import GRID
 
 DELAY = 4e-5
-LAG = (0.2, 0.02)
-"""Lag of first order: s_2 = s_1^2 / 2, [ms]."""
+FIRST_ORDER, SECOND_ORDER = (0.2, 0.02), (0.3, 0.0)
+"""Lags of first order, s_2 = s_1^2 / 2, and of Butterworth's second one, [ms]."""
 LIKE = [CATALOGUE[name] for name in (EFFECT, "temperature", "tread_load", "tread_friction")]
 """The planted effect and some that look like it."""
 
@@ -225,14 +225,15 @@ def test_a_late_campaign_is_fitted_as_well_as_one_on_time(plain: Fitted) -> None
     assert abs(apart - DELAY) < 2.0 * delay_std(behind)
 
 
-def test_an_effect_that_comes_late_is_told_from_a_delay() -> None:
-    measured = runs("low_pass", LAG)
+@pytest.mark.parametrize("lag", [FIRST_ORDER, SECOND_ORDER])
+def test_an_effect_that_comes_late_is_told_from_a_delay(lag: tuple[float, float]) -> None:
+    measured = runs("low_pass", lag)
     among = hypotheses(measured, values_of(TIRE), CATALOGUE["low_pass"])
     base = fitted(among, among.base, Yardstick.of(measured))
     found = among.at(("low_pass",))
     assert found is not None
     after = fitted(among, found, Yardstick.of(measured))
-    assert (np.abs(after.strengths[0] - LAG) < 3.0 * after.strength_std(0)).all()
+    assert (np.abs(after.strengths[0] - lag) < 3.0 * after.strength_std(0)).all()
     assert (after.strength_std(0) < 0.05).all()
     assert abs(delay_of(after)) < 2.0 * delay_std(after)
     assert after.error < 0.3 * base.error
