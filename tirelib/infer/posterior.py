@@ -233,7 +233,8 @@ def posterior(
         here = Quadratic.about(rows, rest, coordinates_of(point), width, spread, ends)
         dz, cost = here.step(), here.cost
         promised = here.fall(dz)
-        little = settled * max(1.0, cost / rest.size)
+        unit = max(1.0, cost / rest.size)
+        little = settled * unit
         there = promised < little
         there = there and bool((np.abs(dz[asked]) < STILL * here.deviation[asked]).all())
         lower = None if there else _downhill(problem, here, point, solved, whiten, damping)
@@ -245,7 +246,7 @@ def posterior(
             continue
         point, solved, rest = lower.point, lower.solved, lower.rest
         moved, damping = lower.moved, lower.damping
-        brings = max(little, SETTLED * cost / rest.size, LOOSE * (cost - FAR * rest.size))
+        brings = max(little, SETTLED * unit, LOOSE * (cost - FAR * rest.size))
         idle = idle + 1 if cost - lower.cost < brings else 0
         if idle == IDLE:
             cost = lower.cost
