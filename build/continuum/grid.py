@@ -10,8 +10,9 @@ from continuum.tire import STRIPS, Tire
 
 ZONE = 0.46
 """Half of the angle in which elements are small [rad]."""
-FINE, COARSE, GROWTH = 0.0115, 0.08, 1.25
-"""Smallest and largest element [rad], and the ratio of neighbours between them."""
+FINE, COARSE, GROWTH = 0.0115, 0.04, 1.25
+"""Smallest and largest element [rad], and the ratio of neighbours between them. On three tires the
+strain moves by .4 to .8e-6 rms when all are halved; with a largest of .08 by 1 to 14e-6."""
 
 
 @dataclass(frozen=True)
