@@ -1,4 +1,4 @@
-// The page of an effect: what it is, its equation and source, and what it would leave in these runs.
+// The page of an effect: what it is, its equation and source, and what is left in these runs if it is missing.
 import { app, arraysOf, current, listen, wish } from "./data.js";
 import { dialog, h, number } from "./dom.js";
 import { isStrain, sliced, unitOf, valueTitle } from "./maps.js";
@@ -20,7 +20,7 @@ export function effectPage(name, e, owner) {
   const input = h("input", { value: fitted, size: 16, "aria-label": "strength" });
   const draw = (trace, strength) => {
     const row = field.rows[field.row];
-    said.textContent = `What ${name} of strength ${strength}${unit} would leave, and the residual (model less measured).`;
+    said.textContent = `What is left if ${name} of strength ${strength}${unit} is missing, and the residual (model less measured).`;
     if (isStrain(data)) {
       const n = data.angle.length;
       plot.show({ title: row.label, unit: "microstrain", y: valueTitle(data), x: { title: "wheel angle [deg]", values: Array.from(data.angle) }, series: [{ name: "residual", values: sliced(data, "difference", row.index), color: "rest" }, { name, values: trace.subarray(row.index * n, (row.index + 1) * n), color: "trace", dash: [6, 4] }] });

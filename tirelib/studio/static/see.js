@@ -72,7 +72,7 @@ export class Field {
     this.limit = limitOf(data[this.value]);
     this.heat.at.row = this.row;
     this.heat.show({ columns: this.columns, rows: this.rows, x: this.x, unit: this.unit, limit: this.limit, say: (r, c) => this.cell(r, c) });
-    const title = this.trace ? `What ${this.trace.name} would leave` : this.value === "measured" ? "What was measured" : "What is left";
+    const title = this.trace ? `What is left if ${this.trace.name} is missing` : this.value === "measured" ? "What was measured" : "What is left";
     fill(this.controls, h("h2", {}, `${title} [${this.unit}]`), h("span", { class: "room" }),
       choose(this.orders(data), this.by, (by) => { this.by = by; this.build(); this.detail(); }, "rows by"),
       choose(known(data).map((k) => [k, VALUES[k]]), this.value, (v) => { this.value = v; this.build(); this.detail(); }, "values"),
