@@ -198,3 +198,14 @@ def test_lab_data_give_the_numbers_of_estimate(
     )
     told(fmu, "run", str(file), str(folder), "--json", str(tmp_path / "f"))
     assert_equal(json.loads((tmp_path / "f").read_text()), json.loads((tmp_path / "e").read_text()))
+
+
+def test_a_damaged_archive_is_refused_with_its_cause(tmp_path: Path) -> None:
+    path = build_fmu(live.calibration_file(), tmp_path / "damaged.fmu")
+    data = bytearray(path.read_bytes())
+    with zipfile.ZipFile(path) as archive:
+        library = archive.getinfo("binaries/linux64/StrainTire.so")
+    data[library.header_offset + library.compress_size // 2] ^= 8
+    path.write_bytes(data)
+    with pytest.raises(FormatError, match=r"damaged\.fmu: cannot be unpacked .*StrainTire\.so"):
+        LoadedFmu(path)

@@ -80,7 +80,12 @@ class LoadedFmu:
         self.references = {v.name: v.valueReference for v in description.modelVariables}
         strains = [name for name in self.references if name.startswith("strain_")]
         self.samples = len(strains) // len(self.calibration.lateral)
-        self._folder = extract(str(path))
+        try:
+            self._folder = extract(str(path))
+        except Exception as error:  # of zipfile, and FMPy's bare ones
+            raise FormatError(
+                f"{path}: cannot be unpacked ({error}); the file is damaged: copy or build it again"
+            ) from None
         self.slave: Any = FMU2Slave(
             guid=description.guid,
             unzipDirectory=self._folder,
