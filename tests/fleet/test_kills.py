@@ -16,7 +16,8 @@ import pytest
 pytest.importorskip("distributed", reason="the extra tirelib[fleet] is not installed")
 
 import dask.config
-from distributed import Client, LocalCluster
+from distributed import Client, Future, LocalCluster
+from distributed.comm.core import CommClosedError
 from distributed.core import Status
 
 from tests.synthetic import synthetic_run, write
@@ -121,6 +122,17 @@ def test_a_killed_scheduler_and_then_the_same_again(
     counts = run(many, out, client)
     assert counts.failed == 0
     assert len(set(finished(out))) == len(finished(out)) == COUNT
+
+
+def test_a_scheduler_that_goes_while_a_result_is_on_its_way_is_lost(
+    many: Path, tmp_path: Path, client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def cut(*_: object, **__: object) -> None:
+        raise CommClosedError("ConnectionPool.gather: Connection reset by peer")
+
+    monkeypatch.setattr(Future, "result", cut)
+    with pytest.raises(SchedulerLostError, match="the scheduler went away"):
+        run(many, tmp_path / "out", client)
 
 
 def test_a_killed_client_and_then_the_same_again(

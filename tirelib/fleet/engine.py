@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pyarrow.dataset as pads
 from distributed import Client, Future, as_completed
+from distributed.comm.core import CommClosedError
 
 from tirelib import __version__
 from tirelib.errors import FormatError, ParameterError, TirelibError
@@ -308,9 +309,13 @@ def _submit(
 def _outcome(
     future: Future[Any], source: Source, mark: str, recipe: Recipe, client: Client
 ) -> Outcome:
+    lost = future.status in ("lost", "cancelled")
     if future.status == "finished":
-        return future.result()  # type: ignore[no-any-return]
-    if future.status in ("lost", "cancelled"):
+        try:
+            return future.result()  # type: ignore[no-any-return]
+        except CommClosedError:  # it went while the result was on its way
+            lost = True
+    if lost:
         raise SchedulerLostError(
             "the scheduler went away; what is finished is kept; start it again, and give the same "
             "command once more"
