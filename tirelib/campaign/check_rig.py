@@ -62,7 +62,10 @@ PLAUSIBLE = {
 """Where the middle of the magnitude of a quantity lies in any tire test, SI."""
 
 LOADED = (0.6, 1.1)
-"""Where a loaded radius lies, relative to the free one."""
+"""Where a loaded radius lies, relative to the free one (assumed: a wide range about the 85 to 100 %
+of a tire that carries its load). The lower end catches a free diameter that is given as a radius,
+which gives about .46. An end twice as far from 1 (.2) would let it pass; one half as far (.8) would
+come near to a tire that is heavily loaded."""
 
 SPIKE = 20.0
 """A rig sample this many robust sigmas off its neighbours is a spike."""

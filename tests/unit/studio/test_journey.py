@@ -168,7 +168,8 @@ def test_a_refit_is_cancelled_at_once_and_can_be_run_again(served: Served, opene
     served.hold.touch()
     changed = served.studio.changed
     served.do(do="add", campaign=opened, model="001", effects=["sidewall_load"])
-    until(lambda: served.studio.changed == changed + 2)  # the page is told that it has begun
+    # once for the new job, and once when it has begun
+    until(lambda: served.studio.changed == changed + 2)
     pid = until(lambda: [each["pid"] for each in served.said() if each["argv"][0] == "add"])[0]
     job = next(j for j in served.campaign(opened)["jobs"] if j["kind"] == "add")
     until(lambda: served.desk.jobs.progress[job["job"]].costs)
