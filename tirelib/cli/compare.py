@@ -136,11 +136,13 @@ def _trace(given: str) -> tuple[str, tuple[float, ...]]:
 
 
 def _answer(document: dict[str, object]) -> str:
-    unit, error, noise = document["unit"], document["error"], document["noise"]
+    unit, noise = document["unit"], document["noise"]
     numbers = (
-        f"{document['residual_rms']:.4g} of {document['measured_rms']:.4g} {unit} rms are not "
-        "explained"
+        f"{document['residual_rms_raw']:.4g} of {document['measured_rms']:.4g} {unit} rms are left"
     )
-    if isinstance(error, float) and error == error:
-        numbers += f"; error {error:.2f} in units of the noise ({noise:.3g} {unit})"
+    if document["quantity"] == "strain":
+        numbers += ", errors of the set points included"
+    if document["error_unit"] == "noise":
+        error = f"error {document['error']:.4g} times the noise ({noise:.3g} {unit})"
+        numbers = f"{error}; {numbers}"
     return f"{document['campaign']}, {document['quantity']}: {document['verdict']}; {numbers}"

@@ -27,6 +27,7 @@ def comparison_document(found: Comparison | ForceComparison) -> dict[str, Any]:
 def _strain(found: Comparison) -> dict[str, Any]:
     fit, noise, floor = found.fit, found.noise, found.floor
     runs = found.chosen.straight
+    errors = dict(zip(np.flatnonzero(runs).tolist(), found.error.by_run.tolist(), strict=True))
     return {
         "format": FORMAT,
         "campaign": found.chosen.waves.header.name,
@@ -62,6 +63,7 @@ def _strain(found: Comparison) -> dict[str, Any]:
                 "counted": bool(runs[i]),
                 "rms": 1e6 * float(found.run_rms[i]),
                 "rms_noise": float(found.run_rms[i]) / noise.std,
+                "error": errors.get(i),
                 "model_edges_deg": np.rad2deg(found.prediction.edges[i]),
             }
             for i in range(len(found.run))

@@ -17,6 +17,14 @@ PLACES = {
     "exit flank": "behind the contact",
     "far side": "away from the contact",
 }
+ENDS = {
+    "entry flank": ("before the contact", "before it"),
+    "entry edge": ("the entry of the contact", "its entry"),
+    "contact": ("inside the contact", "inside it"),
+    "exit edge": ("the exit of the contact", "its exit"),
+    "exit flank": ("behind the contact", "behind it"),
+}
+"""What the first and the last angle of a region are called where they lie in two sectors."""
 
 
 def told(by: str, value: float) -> str:
@@ -35,9 +43,26 @@ def told(by: str, value: float) -> str:
 
 def place(region: Region, edges: FloatArray) -> str:
     """Return the sector of a region's middle in `SECTORS`, by the contact of its runs."""
+    return _sector(0.5 * (region.start + region.stop), region, edges)
+
+
+def extent(region: Region, edges: FloatArray) -> str:
+    """Say where a region lies, by its two ends and the contact of its runs."""
+    first, last = (_end(x, region, edges) for x in (region.start, region.stop))
+    if first == last:
+        return PLACES[place(region, edges)]
+    return f"from {ENDS[first][0]} to {ENDS[last][1]}"
+
+
+def _end(angle: float, region: Region, edges: FloatArray) -> str:
+    """Return the key in `ENDS` of an angle."""
+    sector = _sector(angle, region, edges)
+    return sector if sector in ENDS else "exit flank" if angle > 0.0 else "entry flank"
+
+
+def _sector(angle: float, region: Region, edges: FloatArray) -> str:
     lead, trail = edges[region.member].mean(axis=0)
-    middle = 0.5 * (region.start + region.stop)
-    return SECTORS[int(sector_at(np.array([middle / (trail if middle > 0 else -lead)]))[0])]
+    return SECTORS[int(sector_at(np.array([angle / (trail if angle > 0 else -lead)]))[0])]
 
 
 def amount(mean: float, measured: float) -> str:
@@ -74,8 +99,7 @@ def conditions(by: str, side: str, value: float) -> str:
 
 def sentence(region: Region, edges: FloatArray) -> str:
     """Say one region in plain words."""
-    where = PLACES[place(region, edges)]
-    text = f"{where}, from {region.start:.2f} to {region.stop:.2f} rad, "
+    text = f"{extent(region, edges)}, from {region.start:.2f} to {region.stop:.2f} rad, "
     limit = conditions(region.by, region.side, region.value)
     text += f"{limit}, " if limit else "in all runs, "
     text += f"the model shows {amount(region.mean, region.measured)}"

@@ -137,6 +137,7 @@ def verdict_told(found: Verdict) -> dict[str, Any]:
         "p": found.best.p,
         "p_std": found.best.p_std,
         "p_without": found.base.p,
+        "p_least": found.base.p_of(np.inf)[0],
     }
 
 

@@ -74,10 +74,10 @@ def _left(found: Comparison | ForceComparison) -> str:
             f"model and measurement differ by {number(found.rms, 3)} of "
             f"{number(found.measured_rms, 4)} {unit} rms"
         )
-    fit = found.fit
     return (
-        f"model and measurement differ by {1e6 * fit.rms:.0f} of {1e6 * fit.strain_rms:.0f} "
-        "microstrain rms"
+        f"model and measurement differ by {number(1e6 * found.error.rms, 3)} of "
+        f"{number(1e6 * found.fit.strain_rms, 4)} microstrain rms, errors of the set points "
+        "included"
     )
 
 

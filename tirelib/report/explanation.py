@@ -142,8 +142,8 @@ def _by_p(told: Mapping[str, Any]) -> str:
     it = "it" if len(told["sets"] and told["sets"][0]) == 1 else "them"
     if told["verdict"] not in ("unknown", "form_inadequate"):
         return (
-            f"Without {it} the model is rejected (p = {without}); with {it} nothing stands out "
-            f"from what plain tires show (p = {p})."
+            f"Without {it} the model is rejected (p = {without}{_least(told)}); with {it} nothing "
+            f"stands out from what plain tires show (p = {p})."
         )
     stands = f"{_stands(told['misfit_of'])} stands out from what plain tires show."
     if told["verdict"] == "unknown":
@@ -152,9 +152,15 @@ def _by_p(told: Mapping[str, Any]) -> str:
             f"{level} is needed): {stands}"
         )
     return (
-        f"Without {it} the model is rejected (p = {without}), and with {it} as well "
+        f"Without {it} the model is rejected (p = {without}{_least(told)}), and with {it} as well "
         f"(p = {p}; {level} is needed): {stands}"
     )
+
+
+def _least(told: Mapping[str, Any]) -> str:
+    """Say where the p-value without an effect is as small as it can be."""
+    least = told["p_without"] <= told["p_least"]
+    return ", the smallest value that the table of plain tires can give" if least else ""
 
 
 def _stands(name: str) -> str:
@@ -209,6 +215,7 @@ def error_line(told: Mapping[str, Any]) -> str:
     unit = "times the noise" if told["error_unit"] == "noise" else unit_name(told["error_unit"])
     before, after = told["error_before"], told["error_after"]
     raw = f"{unit_name(told['residual_rms_unit'])} rms"
+    raw += ", errors of the set points included" if told["quantity"] == "strain" else ""
     left = [number(told[f"residual_rms_{when}"], SENSE) for when in ("before", "after")]
     again = told.get("error_refitted")
     anew = "" if not _known(again) or _said(again) == _said(before) else _said(again)
@@ -226,8 +233,8 @@ def error_line(told: Mapping[str, Any]) -> str:
     said = f"It {_moves(before, after)} {unit} {ways[1]} {it}{rms}.{_floor(told, after)}"
     if parted:
         said += (
-            f" With the delay of the gages and the errors of the set points left in, {left[0]} "
-            f"became {left[1]} {raw}."
+            f" The rms that includes the errors of the set points rose from {left[0]} to {left[1]} "
+            f"{unit_name(told['residual_rms_unit'])}."
         )
     said += f" {held_out_line(told)}"
     return f"{said} {ways[0].title()} {it}, {own} leave {anew}." if anew else said

@@ -126,6 +126,8 @@ def test_words_tell_the_sign_and_the_kind_of_strain() -> None:
     before = compared(waveforms(plant=bump(-0.5, -0.3, 5e-5)))
     assert "too much compression" in before.sentences[0]
     assert before.sentences[0].startswith("Before the contact")
+    across = compared(waveforms(plant=bump(-0.4, 0.05, -3e-4)))
+    assert across.sentences[0].startswith("From before the contact to inside it, from -0.40 to")
 
 
 @settings(max_examples=6)
