@@ -85,6 +85,7 @@ TABLE: tuple[UnitRow, ...] = (
     UnitRow("N*m", "moment", 1.0),
     UnitRow("N-m", "moment", 1.0),
     UnitRow("kNm", "moment", 1e3),
+    *(UnitRow(f"N{dot}mm", "moment", 1e-3) for dot in ("", ".", "·", "*", "-")),
     UnitRow("lbf.ft", "moment", _LBF * _FOOT),
     UnitRow("ft-lb", "moment", _LBF * _FOOT),
     UnitRow("s", "time", 1.0),

@@ -276,6 +276,17 @@ def test_an_english_file_is_drafted_with_the_column_that_numbers_its_runs(tmp_pa
     assert "run_column" not in tomllib.loads(suggest_map(file))
 
 
+@pytest.mark.parametrize(("turn_rate", "known"), [(520, True), (0.1, False)])
+def test_a_draft_leaves_out_an_encoder_at_which_no_wheel_rolls(
+    turn_rate: float, known: bool, tmp_path: Path
+) -> None:
+    rows = "".join(f"{k},40.{k},{turn_rate + 0.01 * k}\n" for k in range(9))
+    (tmp_path / "a.csv").write_text(f"Time [s],V [km/h],N [rpm]\n{rows}")
+    draft = suggest_map(tmp_path / "a.csv")
+    assert ("omega" in tomllib.loads(draft)["channels"]) == known
+    assert ('# "N [rpm]"' in draft) != known
+
+
 def test_a_german_file_is_drafted_with_what_the_rig_held(tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     names = (

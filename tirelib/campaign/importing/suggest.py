@@ -18,7 +18,7 @@ from tirelib.campaign.importing.delimited import CsvOptions
 from tirelib.campaign.importing.formats import read_table
 from tirelib.campaign.importing.mapheader import is_gage, strain_number
 from tirelib.campaign.importing.mapreader import FORMAT
-from tirelib.units import QUANTITIES, dimension_of, dimensions_of_unit
+from tirelib.units import QUANTITIES, dimension_of, dimensions_of_unit, to_si
 
 KNOWN_NAMES: Mapping[str, str] = {
     "ET": "time",
@@ -124,6 +124,8 @@ LENGTHS = ("ring_radius_m", "tread_thickness_m", "belt_width_m", "innerliner_off
 """Lengths of a tire that a ring is fitted with."""
 CONSTANT = ("pressure", "speed")
 """Quantities that a rig may hold; anything else that never changes was not connected."""
+ROLLING = (0.05, 3.0)
+"""Radius at which any wheel rolls, m: that of a kart's wheel is .13, of an earth mover's 1.9."""
 _UMLAUTS = str.maketrans({"\u00c4": "AE", "\u00d6": "OE", "\u00dc": "UE"})
 
 
@@ -256,6 +258,7 @@ def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
             known[item.quantity] = item
         else:
             others.append(item)
+    others += [known.pop(quantity) for quantity in _impossible(known)]
     axes, reason = _guessed_axes(table, known)
     strains = [quantity for quantity in known if strain_number(quantity) is not None]
     lines = [
@@ -296,6 +299,25 @@ def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
         for item in others
     ]
     return "\n".join([*lines, ""])
+
+
+def _impossible(known: Mapping[str, ColumnSummary]) -> list[str]:
+    """Return quantities at which no wheel rolls: an encoder that is broken or was not connected."""
+    names = ("speed", "omega", "effective_radius")
+    speed, omega, radius = (_middle(known[name]) if name in known else np.nan for name in names)
+    rolls = {"omega": speed / omega if omega else np.inf, "effective_radius": radius}
+    return [name for name, at in rolls.items() if name in known and not _wheel(at) and speed > 0.0]
+
+
+def _wheel(radius: float) -> bool:
+    return bool(np.isnan(radius) or ROLLING[0] < radius < ROLLING[1])
+
+
+def _middle(item: ColumnSummary) -> float:
+    """Return the median of the magnitudes in SI; NaN where the file does not state the unit."""
+    dimension = dimension_of(item.quantity) or ""
+    stated = dimension in dimensions_of_unit(item.unit)
+    return to_si(item.middle, item.unit, dimension) if stated else np.nan
 
 
 def _set_point_line(name: str, known: Container[str]) -> str:
