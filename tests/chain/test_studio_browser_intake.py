@@ -128,6 +128,42 @@ def test_a_folder_is_sent_by_the_browsers_own_choice(browser: Any, tmp_path: Pat
         page.context.close()
 
 
+def test_a_wrong_folder_and_a_mistyped_address_are_told_as_such(
+    browser: Any, tmp_path: Path
+) -> None:
+    few = list(steady_runs(loads=(2000.0, 4000.0), angles=(-2.0, 2.0), repeats=1))
+    write_forces(tmp_path / "typed", few, "typed")
+    (tmp_path / "letters").mkdir()
+    for name in ("one.txt", "two.txt"):
+        (tmp_path / "letters" / name).write_text("Dear all,\nwe meet at nine.\n")
+    (tmp_path / "half").mkdir()
+    (tmp_path / "half" / "runs.csv").write_bytes((tmp_path / "typed" / "runs.csv").read_bytes())
+    with serve(tmp_path, "--root", str(tmp_path)) as (_, url):
+        page = page_at(browser, url)
+        dialog = page.locator("#dialog")
+        drop(page, tmp_path / "letters")
+        dialog.get_by_text("None of the 2 files").wait_for()
+        assert "separator" not in dialog.inner_text()  # no advice on tables before it is asked for
+        dialog.get_by_role("button", name="Close").click()
+        drop(page, tmp_path / "half")
+        page.locator("#toast", has_text="half/runs.csv: a campaign without its campaign").wait_for()
+        page.evaluate("location.hash = '#/see/tipped'")
+        page.locator("#where", has_text="No campaign here is called tipped").wait_for()
+        page.evaluate("location.hash = '#/open/'")
+        page.locator("#browse").click()
+        path = dialog.get_by_label("path of a folder")
+        path.fill("/nowhere")
+        path.press("Enter")
+        page.locator("#toast", has_text="it lies outside").wait_for()
+        seen = "document.elementFromPoint(innerWidth / 2, innerHeight - 50).id"
+        assert page.evaluate(seen) in ("toast", "dialog")
+        path.fill(str(tmp_path / "typed"))
+        path.press("Enter")
+        dialog.get_by_role("button", name="Open this campaign").click()
+        wait_for(page, "studio.campaign?.title === 'typed'")
+        page.context.close()
+
+
 def test_files_that_are_no_runs_and_wrong_units_are_told_before_the_import(
     browser: Any, tmp_path: Path
 ) -> None:
@@ -159,8 +195,12 @@ def test_files_that_are_no_runs_and_wrong_units_are_told_before_the_import(
         form.get_by_text("its middle is 5 N; plausible is 10 N to 200000 N").wait_for()
         form.get_by_text("its middle is 198 mm; plausible is 240 mm to 440 mm").wait_for()
         page.locator("#import").click()
-        said = form.get_by_role("alert").inner_text().splitlines()
-        assert [line[:14] for line in said] == ["[channels] Fz ", "[channels] loa"]
+        alert = form.get_by_role("alert")
+        said = alert.inner_text().splitlines()
+        assert [line[:14] for line in said] == ["[channels] Fz ", "[tire] free_ra"]
+        page.get_by_label("axes", exact=True).scroll_into_view_if_needed()
+        box = alert.bounding_box()  # it is seen wherever the form has been scrolled
+        assert box["y"] + box["height"] <= page.viewport_size["height"]
         page.get_by_label("free radius in mm").fill("203")
         page.get_by_label("unit of Fz [kN]").fill("kN")
         page.locator("#import").click()
@@ -182,7 +222,7 @@ def test_what_was_measured_is_seen_before_any_model_is_fitted(browser: Any, tmp_
         page = page_at(browser, f"http://{served.host}/?token={TOKEN}")
         page.evaluate(f"location.hash = '#/see/{name}'")
         page.get_by_role("heading", name="What was measured [microstrain]").wait_for()
-        page.get_by_text("fit the base model: step").wait_for()
+        page.get_by_text("fit the base model: fitting; step").wait_for()
         table = saved(page, page.locator(".heat").locator("xpath=.."))
         page.locator("canvas").first.press("ArrowUp")
         curve = saved(page, page.locator(".plot").first)

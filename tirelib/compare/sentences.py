@@ -48,16 +48,15 @@ def place(region: Region, edges: FloatArray) -> str:
 
 def extent(region: Region, edges: FloatArray) -> str:
     """Say where a region lies, by its two ends and the contact of its runs."""
-    first, last = (_end(x, region, edges) for x in (region.start, region.stop))
+    angles = region.start, region.stop
+    sectors = [_sector(angle, region, edges) for angle in angles]
+    first, last = (
+        sector if sector in ENDS else "exit flank" if angle > 0.0 else "entry flank"
+        for sector, angle in zip(sectors, angles, strict=True)
+    )
     if first == last:
-        return PLACES[place(region, edges)]
+        return PLACES[sectors[0] if sectors[0] == sectors[1] else first]
     return f"from {ENDS[first][0]} to {ENDS[last][1]}"
-
-
-def _end(angle: float, region: Region, edges: FloatArray) -> str:
-    """Return the key in `ENDS` of an angle."""
-    sector = _sector(angle, region, edges)
-    return sector if sector in ENDS else "exit flank" if angle > 0.0 else "entry flank"
 
 
 def _sector(angle: float, region: Region, edges: FloatArray) -> str:

@@ -144,7 +144,7 @@ KINDS: Mapping[str, Kind] = {
         ("diagnosis.json",),
     ),
     "traces": Kind(
-        "compute what is left if an effect is missing, for each",
+        "compute the residual that each effect alone would leave",
         lambda o, out: [*_compared(o), *_traced(o), "--data", f"{out}/traces.npz"],
         ("traces.npz",),
     ),

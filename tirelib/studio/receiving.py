@@ -68,6 +68,11 @@ class Receiving:
         campaign = intake.campaign_in(place)
         if campaign is not None:
             return {"campaign": self._open(campaign)}
+        if plans := sorted(place.rglob("runs.csv")):
+            raise FormatError(
+                f"{plans[0].relative_to(place)}: a campaign without its campaign.toml; send the "
+                "folder that holds both"
+            )
         effects = sorted(place.rglob("*.py"))
         if effects:
             return {"effect": self._received(effects[0])}
@@ -126,7 +131,8 @@ class Receiving:
         for kind in ("columns", "suggest"):
             job = last.get(kind)
             if job is not None and job.state == "failed":
-                found["message"] = job.message
+                found["message"] = found["message"] or job.message
+                found["count"] = len(job.order["files"])
             if job is None or job.state != "done":
                 continue
             if kind == "columns":

@@ -205,6 +205,8 @@ class Studio:
             if wish.get("do") == "dropped":
                 await asyncio.to_thread(self.desk.receiving.unpack, str(wish.get("files", "")))
             done = self.desk.do(wish)
+        except TirelibError:
+            raise  # it says what to do
         except (TypeError, ValueError, AttributeError) as error:
             return JSONResponse({"error": f"the request is not understood ({error})"}, 400)
         finally:

@@ -149,6 +149,8 @@ def test_json_has_its_keys_and_units(found: Comparison) -> None:
     assert document["format"] == "tirelib-comparison/1"
     assert document["axes"] == "iso"
     assert document["noise"] == pytest.approx(3.0, rel=0.3)
+    errors = [run["error"] for run in document["runs"] if run["counted"]]
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(document["error"])
     assert document["residual_rms_noise"] == pytest.approx(
         document["residual_rms"] / document["noise"]
     )

@@ -1,6 +1,6 @@
 // Step 4: the refit while it runs, the fall of the error, and every model that was made.
 import { compareModels } from "./compare.js";
-import { app, current, failedOf, nameOf, progressOf, stepOf, verdictOf, wish } from "./data.js";
+import { app, current, failedOf, heldOutOf, nameOf, pathOf, plain, progressOf, stepOf, verdictOf, wish } from "./data.js";
 import { csvButton, fill, h, number, strength, unitName } from "./dom.js";
 import { Plot, waterfall } from "./plots.js";
 
@@ -14,6 +14,14 @@ const FLAGS = {
 function noVerdict(c) {
   const broken = failedOf("compare") || failedOf("diagnose");
   return broken ? h("p", { class: "warn" }, `${broken.title}: ${broken.state}. ${broken.message} `, h("a", { href: `#/suspect/${c.campaign}` }, "What can be done next")) : h("p", { class: "quiet" }, "The verdict of this model is being computed.");
+}
+
+// What to do after a verdict.
+function ahead(model) {
+  const link = (step, text) => h("a", { href: `#/${step}/${app.wanted}` }, text), alike = model.verdict === "indistinguishable";
+  if (model.named.length && !alike) return [link("suspect", `Tick ${model.named.length > 1 ? "them" : "it"} in step 3 and press Add`), "."];
+  if (model.verdict === "none") return ["Nothing more is to be added: ", link("take", "take the model away"), " (step 5), or ", link("suspect", "tick any effect in step 3"), " to see what it does to the error."];
+  return [plain(Object.fromEntries(model.lines).next || "", model), " ", link("suspect", "Step 3 shows the suspects"), "."];
 }
 
 // What was held out, part by part.
@@ -58,17 +66,11 @@ export class Add {
     this.history(c);
   }
 
-  path(c, model) {
-    const out = [];
-    for (let at = model; at && out.length < 500; at = c.models.find((m) => m.number === at.parent)) out.unshift(at);
-    return out;
-  }
-
   steps(c, model) {
-    return this.path(c, model).map((one, i, all) => ({
+    return pathOf(c, model).map((one, i, all) => ({
       name: i ? `${one.action === "remove" ? "− " : "+ "}${one.effect}` : "base model", note: one.fit?.strength !== undefined && one.fit.strength !== null ? strength(one.fit.strength, 3) : "",
       error: i ? one.fit?.error_after ?? one.error : one.error ?? all[1]?.fit?.error_before ?? null,
-      heldout: i ? one.fit?.heldout_error_after ?? null : all[1]?.fit?.heldout_error_before ?? null,
+      heldout: heldOutOf(c, one),
       floor: one.fit?.floor ?? null,
     }));
   }
@@ -87,7 +89,7 @@ export class Add {
     last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(last.std, 2)}${last.unit === "1" ? "" : ` ${unitName(last.unit)}`}. Error ${number(last.error_before, 4)} before, `, h("b", { id: "error-after" }, number(last.error_after, 4)), ` after [${unitName(last.error_unit)}]. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after.`) : null,
     last?.held_out?.length ? heldOut(last) : null,
     last?.flags?.length ? h("p", { class: "warn" }, last.flags.map((flag) => FLAGS[flag] || flag.replaceAll("_", " ")).join(" ")) : null,
-    now?.verdict ? h("p", {}, "The verdict with this model: ", h("b", {}, verdictOf(now.verdict, now.error_unit, now.named)), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", h("a", { href: `#/suspect/${app.wanted}` }, "See the suspects again")) : now ? noVerdict(c) : null,
+    now?.verdict ? h("p", {}, "The verdict with this model: ", h("b", {}, verdictOf(now.verdict, now.error_unit, now.named)), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", ...ahead(now)) : now ? noVerdict(c) : null,
     failed.map((job) => h("p", { class: job.state === "failed" ? "bad" : "warn" }, `${job.kind} ${job.effect}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: job.job }) }, "Run again"))));
     const shown = c.models.filter((m) => m.ready && (this.hidden || !m.hidden));
     fill(this.strip, h("div", { class: "row" }, h("h2", {}, "Models"), h("span", { class: "quiet small" }, "Nothing is deleted. Continue from any of them."), h("span", { class: "room" }),

@@ -1,5 +1,5 @@
 // Two models side by side: their errors, what each leaves as a map in one scale, and every run.
-import { arraysOf, documentOf, nameOf, verdictOf } from "./data.js";
+import { arraysOf, documentOf, heldOutOf, nameOf, RMS_LEFT, rmsOf, verdictOf } from "./data.js";
 import { choose, csvButton, dialog, fill, h, number, strength, unitName } from "./dom.js";
 import { Heat, limitOf } from "./heat.js";
 import { BINS, forceRows, isStrain, niceTicks, strainRows, unitOf } from "./maps.js";
@@ -19,10 +19,10 @@ function mapOf(data, limit) {
 
 const LINES = [
   ["error", (t, m) => (t || m.fit?.error_after) && `${number(t?.error ?? m.fit.error_after, 4)} ${unitName((t || m.fit).error_unit)}`],
-  ["not explained, rms", (t) => t && `${number(t.residual_rms)} ${unitName(t.unit)}`],
+  [RMS_LEFT, (t) => t && `${number(t.residual_rms_raw)} ${rmsOf(t)}`],
   ["effects", (t) => t && (t.effects.map((e) => `${e.effect} ${strength(e.strength)}`).join("; ") || "none")],
   ["verdict", (_, m) => verdictOf(m.verdict, m.error_unit, m.named)],
-  ["held-out error", (_, m) => m.fit?.heldout_error_after && number(m.fit.heldout_error_after, 4)],
+  ["held-out error", (t, m, c) => { const error = heldOutOf(c, m); return error && `${number(error, 4)} ${unitName((t || m.fit).error_unit)}`; }],
 ];
 
 // Rows of the table of runs (forces: curves): name, error of the left model, of the right one.
@@ -31,7 +31,7 @@ function parts(told) {
   told.forEach((t, i) => (t?.runs || t?.curves || []).forEach((part) => {
     const key = part.run !== undefined ? `run ${part.run}` : part.words;
     if (!found.has(key)) found.set(key, [null, null]);
-    found.get(key)[i] = part.rms_noise ?? part.rms;
+    found.get(key)[i] = part.run !== undefined ? part.error : part.rms_noise ?? part.rms;
   }));
   return [...found.entries()];
 }
@@ -48,10 +48,10 @@ export function compareModels(c, models) {
     const both = pick.map((n) => c.models.find((m) => m.number === n));
     const [told, arrays] = await Promise.all([documentOf, arraysOf].map((of, k) => Promise.all(both.map((m) => of(m, ["comparison", "plots"][k], c.quantity).catch(() => null)))));
     const each = parts(told), limit = Math.max(...arrays.filter(Boolean).map((data) => limitOf(data.difference)));
-    fill(body, h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), both.map((m) => h("th", {}, nameOf(m))))), h("tbody", {}, LINES.map(([text, value]) => h("tr", {}, h("td", {}, text), both.map((m, i) => h("td", {}, value(told[i], m) || "–")))))),
+    fill(body, h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), both.map((m) => h("th", {}, nameOf(m))))), h("tbody", {}, LINES.map(([text, value]) => h("tr", {}, h("td", {}, text), both.map((m, i) => h("td", {}, value(told[i], m, c) || "–")))))),
       h("h3", {}, `What each leaves: model less measured${arrays[0] || arrays[1] ? ` [${unitOf(arrays[0] || arrays[1])}]` : ""}, one scale`),
       h("div", { class: "two" }, both.map((m, i) => h("div", {}, h("div", { class: "row small" }, nameOf(m), h("span", { class: "room" }), arrays[i] ? csvButton(`map-${m.number}`, () => heats[i].columns(isStrain(arrays[i]) ? 0 : 0.5)) : null), arrays[i] ? heats[i].element : h("p", { class: "quiet" }, "It has not been compared yet: continue from it once.")))),
-      each.length ? h("h3", {}, "Each run, rms over the noise") : null, h("table", {}, h("tbody", {}, each.map(([name, [x, y]]) => h("tr", {}, h("td", {}, name), h("td", { class: "n" }, number(x)), h("td", { class: "n" }, number(y)), h("td", { class: y < x ? "good" : "warn" }, change(x, y)))))));
+      each.length ? h("h3", {}, `Each ${c.quantity === "strain" ? "run" : "curve"}: error [${unitName((told[0] || told[1]).error_unit)}]`) : null, h("table", {}, h("tbody", {}, each.map(([name, [x, y]]) => h("tr", {}, h("td", {}, name), h("td", { class: "n" }, number(x)), h("td", { class: "n" }, number(y)), h("td", { class: y < x ? "good" : "warn" }, change(x, y)))))));
     arrays.forEach((data, i) => data && heats[i].show(mapOf(data, limit)));
   };
   const side = (i) => choose(options, pick[i], (picked) => { pick[i] = picked; draw(); }, ["left", "right"][i]);

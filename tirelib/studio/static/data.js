@@ -1,5 +1,5 @@
 // What the server knows: one state that all views read, documents and arrays by their time stamp.
-import { toast } from "./dom.js";
+import { number, toast, unitName } from "./dom.js";
 
 export const app = { home: null, campaign: null, running: [], connected: false };
 const listeners = new Set();
@@ -45,14 +45,18 @@ export async function refresh() {
   busy = true;
   try {
     const name = app.wanted;
-    const [home, campaign] = await Promise.all([get("/home"), name ? get("/campaign", { campaign: name }).catch(() => null) : null]);
+    const home = await get("/home"), unknown = Boolean(name) && !home.campaigns.some((one) => one.campaign === name);
+    const campaign = name && !unknown ? await get("/campaign", { campaign: name }).catch(() => null) : null;
     app.home = home;
-    if (name === app.wanted) app.campaign = campaign;
+    if (name === app.wanted) { app.campaign = campaign; app.unknown = unknown; }
     tell("state");
   } catch { /* the connection tells it */ }
   busy = false;
   if (again) { again = false; refresh(); }
 }
+
+// What is said of an address that names no campaign of the session.
+export const UNKNOWN = () => `No campaign here is called ${app.wanted}: choose one of step 1.`;
 
 // The verdicts of a diagnosis in plain words.
 const VERDICTS = {
@@ -84,6 +88,20 @@ export const current = () => {
 // The same, or a base model that can be seen already while the rest of its fit is computed.
 export const inView = () => current() || app.campaign?.models.find((m) => m.number === app.campaign.current && m.documents[`${app.campaign.quantity}/plots.npz`]) || null;
 
+// The models from the base to one.
+export function pathOf(c, model) {
+  const out = [];
+  for (let at = model; at && out.length < 500; at = c.models.find((m) => m.number === at.parent)) out.unshift(at);
+  return out;
+}
+
+// The error on what was held out; that of a base model is told by the first fit that begins from it.
+export const heldOutOf = (c, m) => m.fit?.heldout_error_after ?? c.models.find((one) => one.parent === m.number && one.quantity === c.quantity && one.ready)?.fit?.heldout_error_before ?? null;
+
+// The rms beside the error, of which of strain it is not a multiple.
+export const RMS_LEFT = "model less measured, rms";
+export const rmsOf = (told) => `of ${number(told.measured_rms, 3)} ${unitName(told.unit)}${told.quantity === "strain" ? ", errors of the set points included" : ""}`;
+
 export function nameOf(model) {
   if (model.label) return model.label;
   if (model.action === "identify") return "base model";
@@ -101,11 +119,11 @@ export function timeOf(job) {
   return `${words(Math.max(0, took))}${left > 1 ? `, about ${words(left)} left if it takes as long as the last time` : ""}`;
 }
 export const progressOf = (number) => app.running.find((one) => one.job === number);
-// What a job does now and how long it has run; the cost of a fit is drawn, not told.
+// What a job does now, how many steps it has done, and how long it has run. A job makes several fits: the steps of each would begin anew.
 export function stepOf(job) {
   if (job.state !== "running") return "waits until another job has ended";
   const at = progressOf(job.job);
-  return [at?.label.replace(/, cost \S+$/, "") || at?.what || "the program is loading", timeOf(job)].filter(Boolean).join("; ");
+  return [at?.label.replace(/(^|, )step .*$/, "") || at?.what || "the program is loading", at?.done ? `step ${at.done}` : "", timeOf(job)].filter(Boolean).join("; ");
 }
 
 // What the check tells better: runs that cannot be read, and a base fit that ended with them.

@@ -52,9 +52,11 @@ export function toast(text, bad = false) {
   const place = document.getElementById("toast");
   place.textContent = text;
   place.className = bad ? "bad" : "";
-  place.hidden = false;
+  const hide = () => { if (place.matches(":popover-open")) place.hidePopover(); };
+  hide();
+  place.showPopover(); // above a dialog that is open
   clearTimeout(timer);
-  timer = setTimeout(() => { place.hidden = true; }, bad ? 12000 : 4000);
+  timer = setTimeout(hide, bad ? 12000 : 4000);
 }
 
 export function choose(options, value, change, label) {

@@ -1,4 +1,4 @@
-// The page of an effect: what it is, its equation and source, and what is left in these runs if it is missing.
+// The page of an effect: what it is, its equation and source, and the residual in these runs if it alone were missing.
 import { app, arraysOf, current, listen, wish } from "./data.js";
 import { dialog, h, number } from "./dom.js";
 import { isStrain, sliced, unitOf, valueTitle } from "./maps.js";
@@ -20,14 +20,14 @@ export function effectPage(name, e, owner) {
   const input = h("input", { value: fitted, size: 16, "aria-label": "strength" });
   const draw = (trace, strength) => {
     const row = field.rows[field.row];
-    said.textContent = `What is left if ${name} of strength ${strength}${unit} is missing, and the residual (model less measured).`;
+    said.textContent = `Dashed: the residual (model less measured) as it would be if ${name} of strength ${strength}${unit} alone were missing.`;
     if (isStrain(data)) {
       const n = data.angle.length;
-      plot.show({ title: row.label, unit: "microstrain", y: valueTitle(data), x: { title: "wheel angle [deg]", values: Array.from(data.angle) }, series: [{ name: "residual", values: sliced(data, "difference", row.index), color: "rest" }, { name, values: trace.subarray(row.index * n, (row.index + 1) * n), color: "trace", dash: [6, 4] }] });
+      plot.show({ title: row.label, unit: "microstrain", y: valueTitle(data), x: { title: "wheel angle [deg]", values: Array.from(data.angle) }, series: [{ name: "measured residual", values: sliced(data, "difference", row.index), color: "rest" }, { name: `if ${name} alone were missing`, values: trace.subarray(row.index * n, (row.index + 1) * n), color: "trace", dash: [6, 4] }] });
       return;
     }
     const { key, title: x } = field.slip, order = [...data.run.keys()].sort((a, b) => data[key][a] - data[key][b]);
-    plot.show({ title: "all points", unit: unitOf(data), y: valueTitle(data), x: { title: x, values: order.map((i) => data[key][i]) }, series: [{ name: "residual", values: order.map((i) => data.difference[i]), color: "rest", points: true }, { name, values: order.map((i) => trace[i]), color: "trace", points: true, hollow: true }] });
+    plot.show({ title: "all points", unit: unitOf(data), y: valueTitle(data), x: { title: x, values: order.map((i) => data[key][i]) }, series: [{ name: "measured residual", values: order.map((i) => data.difference[i]), color: "rest", points: true }, { name: `if ${name} alone were missing`, values: order.map((i) => trace[i]), color: "trace", points: true, hollow: true }] });
   };
   const file = `${app.campaign.quantity}/planted.npz`;
   let stop = () => {};

@@ -90,7 +90,7 @@ function columnRow(column, taken, plausible, radius, change) {
   const said = h("div", { class: "small warn" });
   const fault = () => {
     const strain = chosen.value.startsWith("strain_"), found = unlikely(plausible[strain ? "strain" : chosen.value], unit.value.trim(), Math.abs(amount(factor.value)) * (strain ? column.max - column.min : column.middle), chosen.value === "loaded_radius" ? radius() : 1);
-    return found && `${strain ? "it spans" : "its middle is"} ${found}${chosen.value === "loaded_radius" ? " Is the free radius?" : ""}`;
+    return found && `${strain ? "it spans" : "its middle is"} ${chosen.value === "loaded_radius" ? found.replace("Is the unit right?", `with a free radius of ${number(1000 * radius(), 4)} mm. Which of the two is wrong?`) : found}`;
   };
   const show = () => { said.textContent = [wrong() ? `instead of ${column.unit} in the file` : "", fault()].filter(Boolean).join("; "); };
   for (const one of [unit, factor]) one.addEventListener("input", show);
@@ -118,7 +118,12 @@ const DECIDED = /\b(missing|text|backward_time) = "/;
 
 export async function importForm(files, read = {}, before = new Map()) {
   const form = await found(files), again = (stated) => importForm(files, stated, given()), how = layout(files, read, again);
-  if (!form.columns) { dialog("Import", h("p", { class: "bad said" }, bare(form.message)), h("p", {}, "State below how the file is to be read, or export it again."), how.element); return; }
+  if (!form.columns) {
+    const said = h("p", { class: "bad said" }, bare(form.message));
+    dialog("Import", form.count > 1 ? [h("p", {}, `None of the ${form.count} files that might be measurements can be read as one. Is this the right folder? A campaign is a folder with campaign.toml, runs.csv and the recorded runs.`), h("details", {}, h("summary", {}, "Why each file was refused, and how it could be read"), said, how.element)]
+      : [said, h("p", {}, "State below how the file is to be read, or export it again."), how.element]);
+    return;
+  }
   const { map, columns, plausible } = form, file = columns.files[0], taken = new Map(Object.entries(map?.channels || {}).map(([q, c]) => [c.column, [q, c]]));
   const name = field(map?.name, "name", 30), radius = field(map?.tire?.free_radius_m ? 1000 * map.tire.free_radius_m : "", "free radius in mm", 6), lateral = field("", "positions of the gages in mm", 26);
   const lengths = LENGTHS.map(([key, text]) => ({ key, input: field(map?.tire?.[key] ? 1000 * map.tire[key] : "", `${key} in mm`), text }));
@@ -137,7 +142,8 @@ export async function importForm(files, read = {}, before = new Map()) {
     for (const row of rows.filter((r) => r.chosen.value)) {
       if (channels[row.chosen.value]) faults.push(`Two columns are ${row.chosen.value}; leave one out.`);
       channels[row.chosen.value] = row.rule();
-      if (row.fault()) faults.push(`[channels] ${row.chosen.value} (column ${row.column}): ${row.fault()} Mend the unit, or leave the column out.`);
+      if (row.fault() && row.chosen.value === "loaded_radius") faults.push(`[tire] free_radius_m: column ${row.column} is a loaded radius; ${row.fault()} Correct the free radius (half of the diameter), or the unit of the column.`);
+      else if (row.fault()) faults.push(`[channels] ${row.chosen.value} (column ${row.column}): ${row.fault()} Mend the unit, or leave the column out.`);
     }
     if (!axes.value) faults.push("Choose the axis system of the files.");
     if (!(amount(radius.value) > 100)) faults.push("Give the free radius of the tire in mm: half of its diameter without load.");
@@ -152,7 +158,6 @@ export async function importForm(files, read = {}, before = new Map()) {
     const faults = [], made = drawn(faults);
     said.className = "bad said";
     said.textContent = faults.join("\n");
-    if (!axes.value || !(amount(radius.value) > 100)) (axes.value ? radius : axes).focus();
     const done = faults.length ? null : await wish({ do: "import", files, map: made, without: kept.filter(([, box]) => !box.checked).map(([path]) => path) });
     if (!done) return;
     app.follow = done.job;
@@ -162,7 +167,7 @@ export async function importForm(files, read = {}, before = new Map()) {
     const stop = listen((what) => {
       if (what !== "state") return;
       const job = app.home.jobs.find((one) => one.job === done.job);
-      if (job?.state === "failed") { stop(); said.className = "bad said"; said.textContent = plain(job.message, done.map, made.channels); reading.open ||= DECIDED.test(job.message); said.scrollIntoView({ block: "nearest" }); }
+      if (job?.state === "failed") { stop(); said.className = "bad said"; said.textContent = plain(job.message, done.map, made.channels); reading.open ||= DECIDED.test(job.message); }
       if (job?.state === "done") { stop(); document.getElementById("dialog").close(); toast("The campaign was made."); }
     });
   };
@@ -177,7 +182,7 @@ export async function importForm(files, read = {}, before = new Map()) {
     part("Columns", "[channels]", h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ["column", "range", "missing", "quantity", "unit", "factor"].map((t, i) => h("th", { class: i === 1 || i === 2 ? "n" : "" }, t)))), h("tbody", {}, rows.map((r) => r.element)))),
       Object.entries(file.left_out || {}).map(([column, why]) => h("p", { class: "small warn" }, `Left out: ${column}: ${why}`))), strain, tire,
     reading = h("details", { open: Boolean(Object.keys(read).length) || Object.values(file.left_out || {}).some((why) => why.includes("text =")) }, h("summary", {}, "How the files are read"), (file.notes || []).map((note) => h("p", { class: "small quiet" }, note)), how.element),
-    said, h("button", { class: "main", type: "button", id: "import", onclick: go }, "Import"), sent);
+    sent, h("div", { class: "foot" }, said, h("button", { class: "main", type: "button", id: "import", onclick: go }, "Import")));
   restore(before);
   update();
 }

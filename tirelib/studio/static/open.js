@@ -78,7 +78,9 @@ export class Open {
       const done = await wish({ do: "open", path: folder });
       if (done) { document.getElementById("dialog").close(); opened(done, this.go); }
     };
-    dialog("Choose a campaign", h("p", { class: "quiet" }, found.path || "Folders that the server may read where they are (tirelib studio --root adds others)"),
+    const typed = h("input", { value: found.path, size: 50, "aria-label": "path of a folder", placeholder: "/path/of/a/folder" });
+    dialog("Choose a campaign", h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); this.browse(typed.value.trim()); } }, h("label", {}, "Folder ", typed), h("button", {}, "Go there")),
+      found.path ? null : h("p", { class: "quiet small" }, "Folders that the server may read where they are (tirelib studio --root adds others):"),
       h("p", { class: "small quiet" }, "The folder is not among them? ", this.whole()),
       found.campaign ? h("button", { class: "main", type: "button", onclick: () => open(found.path) }, "Open this campaign") : null,
       h("ul", { class: "list scroll" },

@@ -1,5 +1,5 @@
 // Step 2: where the model fails: a map of what is left, the chosen run, and any number over any condition.
-import { active, app, arraysOf, current, documentOf, inDegrees, inView, isFinding, measured, stepOf, verdictOf, wish } from "./data.js";
+import { active, app, arraysOf, current, documentOf, inDegrees, inView, isFinding, measured, pathOf, RMS_LEFT, rmsOf, stepOf, verdictOf, wish } from "./data.js";
 import { choose, csvButton, fill, h, number, unitName } from "./dom.js";
 import { Heat, limitOf } from "./heat.js";
 import { Plot } from "./plots.js";
@@ -10,10 +10,13 @@ const VALUES = { difference: "model less measured", white: "whitened residual", 
 // Which of them are known: before the first fit only what was measured.
 const known = (data) => Object.keys(VALUES).filter((key) => data[key]?.some(Number.isFinite));
 
+// The row that is looked at first: where the model fails most.
+const worstOf = (rows) => rows.reduce((best, row, i) => (rms(row.values) > rms(rows[best].values) ? i : best), 0);
+
 // The map with its controls and the plots of the chosen row; the next step shows the same with a trace.
 export class Field {
   constructor({ height = 400, onRow = null } = {}) {
-    this.by = "load"; this.value = "difference"; this.row = 0; this.range = null; this.trace = null; this.onRow = onRow;
+    this.by = "load"; this.value = "difference"; this.row = null; this.range = null; this.trace = null; this.onRow = onRow;
     this.heat = new Heat("Map of the residual; arrow keys choose a run, with Shift a range", { height, choose: (at) => { this.row = at.row; this.detail(); }, brush: (range) => { this.range = range; this.detail(); this.stats(); } });
     this.controls = h("div", { class: "row" });
     this.said = h("p", { class: "small", role: "status" });
@@ -26,6 +29,8 @@ export class Field {
     this.model = model;
     const key = `${app.campaign.campaign}/${model.number}/${app.campaign.quantity}/${model.documents[`${app.campaign.quantity}/plots.npz`]}`;
     if (key === this.key) return Boolean(this.data);
+    const root = pathOf(app.campaign, model)[0];
+    this.first = root === model ? null : await arraysOf(root, "plots").catch(() => null);
     return this.take(key, await arraysOf(model, "plots"));
   }
 
@@ -33,6 +38,7 @@ export class Field {
   async loadMeasured() {
     const key = `${app.campaign.campaign}/measured/${app.campaign.measured}`, data = await measured();
     if (current() && data?.texts.quantity !== app.campaign.quantity) return false;
+    this.first = null;
     return key === this.key ? Boolean(this.data) : this.take(key, data);
   }
 
@@ -40,6 +46,7 @@ export class Field {
     if (!data) return false;
     const bare = this.data && !this.data.difference; // what was looked at before had no model
     this.key = key; this.data = data; this.trace = null;
+    if (bare) this.row = null;
     if (bare || !known(data).includes(this.value)) [this.value] = known(data);
     const orders = this.orders(data).map(([k]) => k);
     if (!orders.includes(this.by)) [this.by] = orders;
@@ -56,7 +63,8 @@ export class Field {
 
   build() {
     const { data } = this, strain = isStrain(data);
-    this.unit = this.value === "white" ? "noise" : unitOf(data);
+    const shown = this.trace ? "difference" : this.value; // a trace has the scale of the residual
+    this.unit = shown === "white" ? "noise" : unitOf(data);
     const shownData = this.trace ? { ...data, trace: this.trace.values, shapes: { ...data.shapes, trace: data.shapes.difference } } : data;
     const name = this.trace ? "trace" : this.value;
     if (strain) {
@@ -68,17 +76,28 @@ export class Field {
       this.rows = found.rows; this.slip = found.slip; this.columns = BINS;
       this.x = { ...found.slip, ticks: niceTicks(found.slip.low, found.slip.high) };
     }
-    this.row = Math.min(this.row, this.rows.length - 1);
-    this.limit = limitOf(data[this.value]);
+    this.row = Math.min(this.row ?? (data.difference ? worstOf(this.rows) : 0), this.rows.length - 1);
+    this.limit = limitOf((this.own || !this.first?.[shown] ? data : this.first)[shown]); // that of the base model, so that a fall is seen
     this.heat.at.row = this.row;
     this.heat.show({ columns: this.columns, rows: this.rows, x: this.x, unit: this.unit, limit: this.limit, say: (r, c) => this.cell(r, c) });
-    const title = this.trace ? `What is left if ${this.trace.name} is missing` : this.value === "measured" ? "What was measured" : "What is left";
+    const title = this.trace ? `The residual if ${this.trace.name} alone were missing` : this.value === "measured" ? "What was measured" : "What is left";
     fill(this.controls, h("h2", {}, `${title} [${this.unit}]`), h("span", { class: "room" }),
-      choose(this.orders(data), this.by, (by) => { this.by = by; this.build(); this.detail(); }, "rows by"),
+      choose(this.orders(data), this.by, (by) => this.sort(by), "rows by"),
       choose(known(data).map((k) => [k, VALUES[k]]), this.value, (v) => { this.value = v; this.build(); this.detail(); }, "values"),
+      this.first ? choose([["", "of the base model"], ["1", "of this model"]], this.own ? "1" : "", (own) => { this.own = own; this.build(); this.detail(); }, "colour scale") : null,
       choose([["diverging", "blue and red"], ["cividis", "dark to light"]], this.heat.colors, (c) => { this.heat.colors = c; this.heat.image = null; this.heat.draw(); }, "colours"),
       csvButton("map", () => this.heat.columns(strain ? 0 : 0.5)));
     this.stats();
+  }
+
+  // The chosen run stays the chosen one; of forces the rows themselves are other ones.
+  sort(by) {
+    const { index } = this.rows[this.row];
+    this.by = by;
+    this.build();
+    const at = index === undefined ? -1 : this.rows.findIndex((row) => row.index === index);
+    if (at >= 0) { this.row = this.heat.at.row = at; this.heat.draw(); }
+    this.detail();
   }
 
   cell(r, c) {
@@ -88,7 +107,7 @@ export class Field {
 
   stats() {
     const { data, range } = this;
-    if (!range) { this.said.textContent = `${isStrain(data) ? (data.edges ? "The thin lines are the edges of the model's contact. " : "") : "Where the map is grey, nothing was measured. "}Drag over the map or the plot (at the keyboard: Shift with the arrow keys) to see the rms of a range and its share of the squares.`; return; }
+    if (!range) { this.said.textContent = `${isStrain(data) ? (data.edges ? "The thin lines are the edges of the model's contact. The errors of the set points (load, pressure, gain and angle of each run) are taken out of the map. " : "") : "Where the map is grey, nothing was measured. "}Drag over the map or the plot (at the keyboard: Shift with the arrow keys) to see the rms of a range and its share of the squares.`; return; }
     const at = (k) => this.x.low + ((k + 0.5) * (this.x.high - this.x.low)) / this.columns;
     const found = share(data, this.value, this.rows, (k) => at(k) >= range[0] && at(k) <= range[1], data.counted);
     this.said.textContent = `From ${number(range[0])} to ${number(range[1])}${isStrain(data) || this.slip.key === "slip_angle" ? " deg" : ""}: rms ${number(found.rms)} ${this.unit}, ${number(100 * found.share, 3)} % of the squares, ${found.count} values.`;
@@ -145,14 +164,14 @@ export class See {
       return;
     }
     this.body.hidden = false;
-    const c = compared, said = [...c.statements, ...c.messages];
+    const c = compared, said = [...c.statements, ...c.messages], none = model.verdict === "none";
     fill(this.head, h("div", { class: "row" },
       h("div", { class: "figures" }, h("div", {}, h("span", { class: "quiet" }, "error of the model"), h("b", { id: "error" }, number(c.error, 4)), h("span", { class: "quiet" }, unitName(c.error_unit))),
-        h("div", {}, h("span", { class: "quiet" }, "not explained, rms"), h("b", {}, number(c.residual_rms, 3)), h("span", { class: "quiet" }, `of ${number(c.measured_rms, 3)} ${unitName(c.unit)}`)),
         c.noise ? h("div", {}, h("span", { class: "quiet" }, "noise of the repeats"), h("b", {}, number(c.noise, 3)), h("span", { class: "quiet" }, unitName(c.unit))) : null,
-        h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, verdictOf(model.verdict, c.error_unit, model.named) || (c.verdict === "fits" ? "the model fits" : "not known yet")), h("span", { class: "quiet" }, !c.noise ? "the noise is not known" : c.verdict === "fits" ? "what is left is noise" : "what is left is more than noise"))),
+        h("div", {}, h("span", { class: "quiet" }, RMS_LEFT), h("b", { id: "rms" }, number(c.residual_rms_raw, 3)), h("span", { class: "quiet" }, rmsOf(c))),
+        h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, verdictOf(model.verdict, c.error_unit, model.named) || (c.verdict === "fits" ? "the model fits" : "not known yet")), h("span", { class: "quiet" }, !c.noise ? "the noise is not known" : c.verdict === "fits" ? "what is left is noise" : none ? "what is left is noise and the structure of a tire" : "what is left is more than noise"))),
       h("span", { class: "room" }), h("button", { class: "main", type: "button", onclick: () => this.go("suspect") }, "Find what is missing")),
-    said.length ? h("details", {}, h("summary", {}, `Where it fails, in words (${said.length})`), h("ul", {}, said.map((s) => h("li", {}, inDegrees(s))))) : null);
+    said.length ? h("details", {}, h("summary", {}, `${none ? "Where model and measurement differ, though no more than in plain tires" : "Where it fails"}, in words (${said.length})`), h("ul", {}, said.map((s) => h("li", {}, inDegrees(s))))) : null);
     this.plots();
   }
 
@@ -235,7 +254,7 @@ let asked = ""; // what was asked for last, so that it is asked for once
 // What is computed while there is nothing to be seen, and what has failed.
 export function wait(place, kinds = ["check", "identify", "compare"]) {
   const c = app.campaign;
-  if (!c) { fill(place, h("p", {}, "Open a campaign first.")); return; }
+  if (!c) { fill(place, h("p", {}, h("a", { href: "#/open/" }, "Open a campaign first."))); return; }
   const running = active().filter((job) => job.subject.campaign === c.campaign);
   const broken = c.jobs.filter((job) => ["failed", "interrupted", "cancelled"].includes(job.state) && kinds.includes(job.kind) && !isFinding(job)).at(-1);
   const model = current(), idle = model && !running.length && !broken;
@@ -243,7 +262,7 @@ export function wait(place, kinds = ["check", "identify", "compare"]) {
     asked = `${c.campaign}/${model.number}/${c.quantity}`;
     wish({ do: "look", campaign: c.campaign, model: model.number, quantity: c.quantity });
   }
-  fill(place, h("h2", {}, running.length ? "Being computed" : broken ? "It could not be computed" : "Nothing to be seen yet"),
+  fill(place, h("h2", {}, broken && !running.length ? "It could not be computed" : c.check?.errors ? "Nothing to be seen yet" : "Being computed"),
     running.length && !model ? h("p", { class: "quiet" }, inView() ? "The base model is fitted, and step 2 shows where it fails. How well each of its numbers is known is being computed; then the search for what is missing begins by itself." : "The campaign is checked while the base model is fitted to it; then they are compared, and the page shows it by itself. That takes some seconds to half a minute on an idle machine, longer beside other work. What was measured needs no model: step 2 shows it as soon as the runs are read.") : null,
     c.check?.errors ? h("p", { class: "bad" }, `The campaign has ${c.check.errors} ${c.check.errors === 1 ? "error" : "errors"}: `, h("a", { href: `#/open/${c.campaign}` }, "step 1 lists them with what to do"), ".") : null,
     running.map((job) => h("p", {}, `${job.title}: ${stepOf(job)}`)),

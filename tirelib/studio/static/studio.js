@@ -1,5 +1,5 @@
 // The frame: steps, campaign, quantity, jobs; the view of the step that the address names.
-import { active, app, connect, current, inView, isFinding, listen, nameOf, progressOf, refresh, stepOf, tell, wish } from "./data.js";
+import { active, app, connect, current, inView, isFinding, listen, nameOf, progressOf, refresh, stepOf, tell, UNKNOWN, wish } from "./data.js";
 import { h, fill, toast } from "./dom.js";
 import { entries, Open, receive } from "./open.js";
 import { See } from "./see.js";
@@ -20,7 +20,7 @@ export const go = (name, campaign = app.wanted || "") => { location.hash = `#/${
 
 function route() {
   const { name, campaign } = address();
-  if (campaign !== (app.wanted || "")) { app.wanted = campaign; app.campaign = null; refresh(); }
+  if (campaign !== (app.wanted || "")) { app.wanted = campaign; app.campaign = null; app.unknown = false; refresh(); }
   if (name !== step) {
     view?.leave?.();
     step = name;
@@ -36,7 +36,7 @@ function draw() {
     href: `#/${name}/${app.wanted || ""}`, "aria-current": name === step ? "step" : null,
     "aria-disabled": name !== "open" && !c ? "true" : null,
   }, h("b", {}, i + 1), title)));
-  fill(document.getElementById("where"), c ? `${c.title}${model ? ` · ${nameOf(model)}` : ""}` : "No campaign is open");
+  fill(document.getElementById("where"), c ? `${c.title}${model ? ` · ${nameOf(model)}` : ""}` : app.unknown ? UNKNOWN() : "No campaign is open");
   document.title = c ? `${c.title} – tirelib studio` : "tirelib studio";
   const box = document.getElementById("quantity-box"), select = document.getElementById("quantity");
   box.hidden = !c || c.quantities.length < 2;

@@ -102,9 +102,9 @@ export class Suspect {
     for (const name of told.dead) put(this.dead(name, (told.dead_reasons || {})[name]), name);
     const withP = told.candidates.some((e) => e.p !== undefined && e.p !== null);
     const rank = (part) => Math.min(...groups.get(part).map((r) => Number(r.dataset.rank || 999)), 999);
-    fill(this.list, h("div", { class: "row" }, h("h2", {}, "Effects"), h("span", { class: "quiet small" }, told.byHand ? "There is no verdict: tick what you suspect, and the fit tells what it takes away." : "Hover or focus a line to see what is left if the effect is missing: the more it looks like the residual, the better. Tick what to add."), h("span", { class: "room" }),
+    fill(this.list, h("div", { class: "row" }, h("h2", {}, "Effects"), h("span", { class: "quiet small" }, told.byHand ? "There is no verdict: tick what you suspect, and the fit tells what it takes away." : "Hover or focus a line: dashed is the residual as it would be if this effect alone were missing. The more it looks like the measured residual, the better. Tick what to add."), h("span", { class: "room" }),
       this.button = h("button", { class: "main", type: "button", id: "add", onclick: () => this.add() }, "Add")),
-    h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, told.byHand ? null : h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n", title: "how well the measurements agree with the model that has this effect; what falls below the chance of a false alarm is rejected" }, withP ? "p with it" : "score / threshold"), h("th", { title: "± one standard deviation" }, "strength"), h("th", { class: "n", title: `error with this effect, ${unitName(told.error_unit)}` }, "error with it"), h("th", { class: "n", title: "chance that a diagnosis of this plan finds the effect at this strength" }, "chance to find it"))),
+    h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, told.byHand ? null : h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n", title: "how well the measurements agree with the model that has this effect; what falls below the chance of a false alarm is rejected. The smallest value that the table of plain tires can give is marked." }, withP ? "p with it" : "score / threshold"), h("th", { title: "± one standard deviation" }, "strength"), h("th", { class: "n", title: `error with this effect, ${unitName(told.error_unit)}` }, "error with it"), h("th", { class: "n", title: "chance that a diagnosis of this plan finds the effect at this strength" }, "chance to find it"))),
       h("tbody", {}, [...groups.keys()].filter((part) => groups.get(part).length).sort((a, b) => rank(a) - rank(b)).map((part) => [h("tr", { class: "part" }, h("td", { colspan: 6 }, part)), ...groups.get(part).sort((a, b) => Number(a.dataset.rank || 999) - Number(b.dataset.rank || 999))])))));
     this.count();
   }
@@ -123,7 +123,7 @@ export class Suspect {
       h("td", {}, this.tick(e)),
       h("td", {}, this.named(e, e), " ", alike && inSets(e.effect, told) ? h("span", { class: "tag alarm" }, "indistinguishable") : named ? h("span", { class: "tag alarm" }, "named") : e.level !== "quiet" ? h("span", { class: "tag" }, e.level) : null,
         h("div", { class: "small quiet" }, this.title(e.effect)?.title || e.title || "", e.twins.length ? ` Looks like ${e.twins.map((t) => `${t.effect} (${number(t.angle_deg, 2)} deg apart)`).join(", ")}.` : "", inSets(e.effect, told))),
-      h("td", { class: "n" }, e.p !== undefined && e.p !== null ? [number(e.p, 2), e.p_std ? h("div", { class: "small quiet" }, `± ${number(e.p_std, 1)}`) : null] : number(e.score / e.threshold, 3)),
+      h("td", { class: "n" }, e.p !== undefined && e.p !== null ? [number(e.p, 2), h("div", { class: "small quiet" }, e.p <= told.p_least ? "smallest" : e.p_std ? `± ${number(e.p_std, 1)}` : "")] : number(e.score / e.threshold, 3)),
       h("td", {}, `${strength(e.strength)} ± ${strength(e.std, 2)} ${e.unit === "1" ? "" : unitName(e.unit)}`, e.in_range ? null : h("div", { class: "small warn" }, `outside the plausible ${(e.range || []).map((x) => number(x)).join(" to ")}`)),
       h("td", { class: "n" }, number(e.error_after)),
       h("td", { class: "n small quiet" }, e.power !== undefined && e.power !== null ? e.power < 0.01 ? "below 1 %" : `${number(100 * e.power, 2)} %` : ""));
@@ -164,7 +164,7 @@ export class Suspect {
     if (!data) return;
     const begun = performance.now(), row = this.field.rows[this.field.row], name = this.hovered;
     const trace = name && this.traces?.[`trace_${name}`], fault = name && this.traces?.texts[`fault_${name}`];
-    const title = this.told?.byHand ? "what is left; the page of an effect plants it" : !name ? "hover an effect to see what is left if it is missing" : fault ? `${name}: ${fault}` : trace ? `the residual, and what is left if ${name} of its fitted strength is missing` : this.traces ? `${name}: no trace` : "the traces of the effects are being computed";
+    const title = this.told?.byHand ? "the residual; the page of an effect plants it" : !name ? "the residual; hover an effect to see how it would be if that effect alone were missing" : fault ? `${name}: ${fault}` : trace ? `the residual, and how it would be if ${name} alone were missing` : this.traces ? `${name}: no trace` : "what each effect alone would leave is being computed";
     const points = !isStrain(data);
     let x, rest, own;
     if (points) {
@@ -176,7 +176,7 @@ export class Suspect {
       rest = sliced(data, "difference", row.index);
       own = trace && trace.subarray(row.index * data.angle.length, (row.index + 1) * data.angle.length);
     }
-    this.plot.show({ title: `${title}; ${row.label}`, unit: unitOf(data), y: valueTitle(data), x, series: [{ name: "residual, model less measured", values: rest, color: "rest", points }, { name: "left if the effect is missing", values: own || new Array(x.values.length).fill(null), color: "trace", dash: [6, 4], points, hollow: points }] });
+    this.plot.show({ title: `${title}; ${row.label}`, unit: unitOf(data), y: valueTitle(data), x, series: [{ name: "measured residual, model less measured", values: rest, color: "rest", points }, { name: name ? `if ${name} alone were missing` : "if one effect alone were missing", values: own || new Array(x.values.length).fill(null), color: "trace", dash: [6, 4], points, hollow: points }] });
     app.drawn = performance.now() - begun; // how long a hover takes, [ms]
     if (this.field.trace?.name !== (trace ? name : undefined)) {
       clearTimeout(this.later);
