@@ -90,7 +90,7 @@ function columnRow(column, taken, plausible, radius, change) {
   const said = h("div", { class: "small warn" });
   const fault = () => {
     const strain = chosen.value.startsWith("strain_"), found = unlikely(plausible[strain ? "strain" : chosen.value], unit.value.trim(), Math.abs(amount(factor.value)) * (strain ? column.max - column.min : column.middle), chosen.value === "loaded_radius" ? radius() : 1);
-    return found && `${strain ? "it spans" : "its middle is"} ${chosen.value === "loaded_radius" ? found.replace("Is the unit right?", `with a free radius of ${number(1000 * radius(), 4)} mm. Which of the two is wrong?`) : found}`;
+    return found && `${strain ? "it spans" : "its middle is"} ${chosen.value === "loaded_radius" ? found.replace(". Is the unit right?", ` at a free radius of ${number(1000 * radius(), 4)} mm.`) : found}`;
   };
   const show = () => { said.textContent = [wrong() ? `instead of ${column.unit} in the file` : "", fault()].filter(Boolean).join("; "); };
   for (const one of [unit, factor]) one.addEventListener("input", show);

@@ -166,10 +166,10 @@ export class See {
     this.body.hidden = false;
     const c = compared, said = [...c.statements, ...c.messages], none = model.verdict === "none";
     fill(this.head, h("div", { class: "row" },
-      h("div", { class: "figures" }, h("div", {}, h("span", { class: "quiet" }, "error of the model"), h("b", { id: "error" }, number(c.error, 4)), h("span", { class: "quiet" }, unitName(c.error_unit))),
-        c.noise ? h("div", {}, h("span", { class: "quiet" }, "noise of the repeats"), h("b", {}, number(c.noise, 3)), h("span", { class: "quiet" }, unitName(c.unit))) : null,
-        h("div", {}, h("span", { class: "quiet" }, RMS_LEFT), h("b", { id: "rms" }, number(c.residual_rms_raw, 3)), h("span", { class: "quiet" }, rmsOf(c))),
-        h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, verdictOf(model.verdict, c.error_unit, model.named) || (c.verdict === "fits" ? "the model fits" : "not known yet")), h("span", { class: "quiet" }, !c.noise ? "the noise is not known" : c.verdict === "fits" ? "what is left is noise" : none ? "what is left is noise and the structure of a tire" : "what is left is more than noise"))),
+      h("div", { class: "figures" }, h("div", {}, h("span", { class: "quiet" }, "error of the model"), h("b", { id: "error" }, number(c.error, 4)), h("span", { class: "quiet small" }, unitName(c.error_unit))),
+        c.noise ? h("div", {}, h("span", { class: "quiet" }, "noise of the repeats"), h("b", {}, number(c.noise, 3)), h("span", { class: "quiet small" }, unitName(c.unit))) : null,
+        h("div", {}, h("span", { class: "quiet" }, RMS_LEFT), h("b", { id: "rms" }, number(c.residual_rms_raw, 3)), h("span", { class: "quiet small" }, rmsOf(c))),
+        h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, verdictOf(model.verdict, c.error_unit, model.named) || (c.verdict === "fits" ? "the model fits" : "not known yet")), h("span", { class: "quiet small" }, !c.noise ? "the noise is not known" : c.verdict === "fits" ? "what is left is noise" : none ? "what is left is noise and the structure of a tire" : "what is left is more than noise"))),
       h("span", { class: "room" }), h("button", { class: "main", type: "button", onclick: () => this.go("suspect") }, "Find what is missing")),
     said.length ? h("details", {}, h("summary", {}, `${none ? "Where model and measurement differ, though no more than in plain tires" : "Where it fails"}, in words (${said.length})`), h("ul", {}, said.map((s) => h("li", {}, inDegrees(s))))) : null);
     this.plots();
