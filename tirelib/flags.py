@@ -54,6 +54,9 @@ class TurnFlag(IntFlag):
 
     ACCELERATING = 524288
     """The turn rate changes within the turn by more than its sources show: angles are uncertain."""
+    OMEGA_MISMATCH = 2097152
+    """The measured turn rate is less than two thirds, or more than 1.5 times, what the contacts
+    give."""
 
 
 INVALIDATING = (
@@ -61,6 +64,7 @@ INVALIDATING = (
     | TurnFlag.PERIOD_JUMP
     | TurnFlag.ACCELERATING
     | TurnFlag.TRIGGER_MISMATCH
+    | TurnFlag.OMEGA_MISMATCH
     | TurnFlag.REVERSED
     | TurnFlag.OUT_OF_RANGE
     | TurnFlag.CUT_OFF

@@ -96,7 +96,10 @@ static void find_slip(const Turned *t, int plausible, Prediction *result) {
     e->std = fabs(gain) * std;
     t->values[V_SLIP_RATIO] = e->value;
     t->values[V_SLIP_STD] = e->std;
-    e->valid = valid(t, KAPPA, e->value, e->std) && plausible;
+    /* the radius depends on the pressure; at a low speed it is what it is at a higher one */
+    e->valid = valid(t, KAPPA, e->value, e->std) && plausible &&
+               pressure_allowed(&t->chain->laws, t->k, t->values) &&
+               not_too_fast(&t->chain->laws, t->k, t->values);
     e->there = 1;
 }
 
@@ -256,7 +259,7 @@ void chain_predict(const Calibration *calibration, const Chain *c, double *value
     if (c->load.there)
         widen(&result->of[FZ], c->load_per_hardening * hardening_std(&t, k->law_doubt));
     /* Reference: Chain._slip_calibrated */
-    if (c->radius.there && !own_inside(&c->guard[KAPPA], result->of[KAPPA].value))
+    if (c->radius.there && !named_inside(&c->guard[KAPPA], -1, result->of[KAPPA].value))
         for (int q = 0; q < QUANTITIES; q++)
             if (q != KAPPA) result->of[q].valid = 0;
 }

@@ -47,7 +47,8 @@ enum {
     NO_CONTACT = 131072,
     FAULT = 262144,
     ACCELERATING = 524288,
-    OTHER_TIRE = 1048576
+    OTHER_TIRE = 1048576,
+    OMEGA_MISMATCH = 2097152
 };
 
 /* One wheel angle of a turn, [rad], as numpy.linspace rounds it: tirelib.signal.turn.PHI. */

@@ -1,16 +1,10 @@
 #include "contacts.h"
 
 static const double RISE = 0.7, FALL = 0.62, JUMP = 2.5, GAP_REACH = 0.1, PATIENCE = 2.5;
-static const double SMALLEST_SWING = 5e-4;
+static const double SMALLEST_SWING = 5e-4, SLEW = 32.0, LEAST_SLEW = 0.1, PULSES = 250.0;
+static const double LONGEST_BURST = 0.02;
 
 double contact_middle(const Contact *contact) { return 0.5 * (contact->rise + contact->fall); }
-
-/* Decide how long the finder waits for a contact. */
-static void find_patience(ContactFinder *f) {
-    f->patience = f->longest_turn;
-    if (f->periods && (int64_t)(PATIENCE * f->last_period) < f->patience)
-        f->patience = (int64_t)(PATIENCE * f->last_period);
-}
 
 /* ContactFinder._restart */
 static void restart(ContactFinder *f) {
@@ -20,14 +14,15 @@ static void restart(ContactFinder *f) {
     f->lowest = INFINITY;
     f->highest = -INFINITY;
     f->since = f->count;
-    find_patience(f);
+    f->patience = f->longest_turn;
 }
 
 void finder_start(ContactFinder *f, int64_t longest_turn, int centre) {
     f->longest_turn = longest_turn;
     f->centre = centre;
     f->count = 0;
-    f->seen = 0;
+    f->seen = f->whole = f->bursts = 0;
+    f->first_burst = f->last_burst = f->apart = 0;
     f->tail[0] = f->tail[1] = f->held = NAN;
     f->pulse_start = 0;
     f->last_middle = f->last_period = NAN;
@@ -52,6 +47,9 @@ static int64_t room(const ContactFinder *f) {
 static int extreme_hidden(const ContactFinder *f, const Ring *ring) {
     int64_t first = (int64_t)floor(f->last_rise) + 1, base = ring_base(ring);
     double reach = GAP_REACH * f->last_period;
+    if (f->bursts && (!f->periods || (double)f->first_burst < (double)f->since + reach ||
+                      (double)f->last_burst > (double)f->pulse_start - reach))
+        return 1;
     for (int64_t i = first > base ? first : base; i < f->count; i++) {
         if (isfinite(ring_at(ring, f->centre, i))) continue;
         if (!f->periods) return 1;
@@ -97,16 +95,38 @@ static int finished(ContactFinder *f, const Ring *ring, double last, Contact *fo
     found->rise = rise + shift;
     found->fall = fall + shift;
     found->fresh = fresh;
-    found->damaged = 0;
+    found->burst = f->bursts;
+    found->damaged = f->bursts && f->last_burst >= (int64_t)found->rise - NEAR_EDGE;
     double middle = contact_middle(found);
     f->last_rise = found->rise;
+    f->bursts = f->bursts && (double)f->last_burst > found->rise;
+    if (f->first_burst < (int64_t)found->rise + 1) f->first_burst = (int64_t)found->rise + 1;
     f->since = f->count;
     f->periods = !fresh;
     f->last_period = middle - f->last_middle;
     f->last_middle = middle;
     f->middles = 1;
-    find_patience(f);
+    double patience = fresh ? PULSES * (found->fall - found->rise) : PATIENCE * f->last_period;
+    if (!fresh) f->patience = f->longest_turn; /* after a jump it is what it was */
+    if (patience < (double)f->patience) f->patience = (int64_t)patience;
     return 1;
+}
+
+/* ContactFinder._until_burst: return a sample, or the good one that stands for it. */
+static double without_burst(ContactFinder *f, const Ring *ring, double y) {
+    double good = f->count ? *ring_seen(ring, f->count - 1) : NAN;
+    double steep = SLEW * (2.0 * PI / f->last_period);
+    int known = f->levels && f->periods && f->whole == 3;
+    if (!known || !(fabs(y - good) > f->swing * (steep > LEAST_SLEW ? steep : LEAST_SLEW)) ||
+        !((double)f->apart < LONGEST_BURST * f->last_period)) {
+        f->apart = 0;
+        return y;
+    }
+    f->last_burst = f->count + 1; /* the median of three lags by one sample */
+    if (!f->bursts) f->first_burst = f->last_burst;
+    f->bursts = 1;
+    f->apart++;
+    return good;
 }
 
 /* ContactFinder._until_jump: the swing outgrows the levels. */
@@ -115,7 +135,6 @@ static void look_for_jump(ContactFinder *f, double y) {
     if (!f->levels || high - low <= JUMP * f->swing) return;
     f->levels = f->middles = f->periods = 0;
     f->armed = 1;
-    find_patience(f);
 }
 
 /* ContactFinder._advance, of one sample */
@@ -157,6 +176,7 @@ static int advance(ContactFinder *f, const Ring *ring, double y, Contact *found)
 
 int finder_take(ContactFinder *f, const Ring *ring, Contact *found) {
     double x = ring_at(ring, f->centre, ring->total - 1), y = NAN;
+    f->whole = !isfinite(x) ? 0 : f->whole < 3 ? f->whole + 1 : 3;
     if (isfinite(x)) f->held = x; /* ContactFinder._without_gaps */
     x = f->held;
     int whole = f->seen == 2;
@@ -168,6 +188,7 @@ int finder_take(ContactFinder *f, const Ring *ring, Contact *found) {
         f->seen++;
         return 0;
     }
+    y = without_burst(f, ring, y);
     *ring_seen(ring, f->count) = y;
     return advance(f, ring, y, found);
 }

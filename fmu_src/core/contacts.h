@@ -13,18 +13,25 @@ typedef struct {
     double rise, fall;
     int fresh;   /* no valid turn precedes it */
     int damaged; /* samples are missing where it begins or ends */
+    int burst;   /* samples were left out since the contact before */
 } Contact;
+
+/* Samples before an edge that must not be missing. */
+enum { NEAR_EDGE = 3 };
 
 typedef struct {
     int64_t longest_turn, count; /* count: samples taken, after the median of three */
     int centre;                  /* column of the centre gage */
     double tail[2], held;        /* last samples without gaps */
     int seen;                    /* how many of the tail there are */
+    int whole;                   /* how many samples were there before a missing one; 3: or more */
     int levels, armed, pulse;    /* levels: not start-up; pulse: within one */
     double level, low_level, swing, lowest, highest;
     int64_t pulse_start, since, patience;
     int middles, periods; /* whether the last middle, the last period are known */
     double last_middle, last_period, last_rise;
+    int bursts; /* whether samples were left out since the last rise, from the first to the last */
+    int64_t first_burst, last_burst, apart; /* apart: how many since the last good one */
 } ContactFinder;
 
 void finder_start(ContactFinder *finder, int64_t longest_turn, int centre);

@@ -4,6 +4,7 @@
 
 #include "chain.h"
 #include "laws.h"
+#include "polynomial.h"
 #include "quality.h"
 #include "regressors.h"
 #include "unknowns.h"
@@ -12,7 +13,7 @@
 enum {
     INVALIDATING = FIRST_TURN | PERIOD_JUMP | ACCELERATING | TRIGGER_MISMATCH | REVERSED |
                    OUT_OF_RANGE | CUT_OFF | TOO_FEW_GAGES | NO_CONDITION | NO_CONTACT | FAULT |
-                   OTHER_TIRE
+                   OTHER_TIRE | OMEGA_MISMATCH
 };
 
 /* What the chain of the working gages says of a turn. */
@@ -95,6 +96,20 @@ static void contact_lengths(const Calibration *cal, const Turn *turn, const Feat
     }
 }
 
+/* Notes of the conditions for which the calibration does not hold.
+ * Reference: Chain.conditions_allowed */
+static int conditions_beyond(const Chain *c, const Constants *k, const double *given) {
+    int notes = 0;
+    for (int i = 0; i < (c->force.there ? 2 : 1); i++) {
+        const Laws *laws = i ? &c->force_laws : &c->laws;
+        if (!pressure_allowed(laws, k, given)) notes |= PRESSURE_OUT_OF_RANGE;
+        if (!speed_allowed(laws, k, given)) notes |= SPEED_OUT_OF_RANGE;
+    }
+    if (!named_inside(&c->guard[FY], V_CAMBER, given[V_CAMBER]))
+        notes |= CAMBER_OUT_OF_RANGE;
+    return notes;
+}
+
 /* Whether a quantity of the full chain is calibrated. Reference: Chain.has */
 static int calibrated(const Chain *c, int quantity) {
     const Polynomial *model[QUANTITIES] = {&c->load, &c->angle, &c->radius, &c->force};
@@ -127,6 +142,10 @@ static void finish(const Calibration *cal, const Turn *turn, const Said *said, E
     for (int i = 0; i < 3; i++)
         if (measured && !road_plausible(&full->road, given, V_FRICTION + i))
             e->notes |= FRICTION_IMPLAUSIBLE << i;
+    given[V_PRESSURE] = turn->pressure;
+    given[V_SPEED] = turn->speed;
+    given[V_CAMBER] = turn->camber;
+    if (measured) e->notes |= conditions_beyond(full, &cal->constants, given);
     if (measured && !in_range) e->flags |= OUT_OF_RANGE;
     if (other) e->flags |= OTHER_TIRE;
     for (int q = 0; q < QUANTITIES && !measured; q++) e->value[q] = e->std[q] = NAN;

@@ -43,8 +43,8 @@ double equivalent_load(const Laws *laws, double load, const double *values) {
     return needs_law(laws) && isfinite(ratio) && ratio > 0.0 ? load * ratio : load;
 }
 
-int conditions_allowed(const Laws *laws, const Constants *k, const double *values) {
-    double low = laws->pressure[0], high = laws->pressure[1], speed = fabs(values[V_SPEED]);
+int pressure_allowed(const Laws *laws, const Constants *k, const double *values) {
+    double low = laws->pressure[0], high = laws->pressure[1];
     if (laws->pressure_fitted) {
         double slack = k->calibrated_slack * (high - low);
         low -= slack;
@@ -53,10 +53,20 @@ int conditions_allowed(const Laws *laws, const Constants *k, const double *value
         low *= k->pressure_low;
         high *= k->pressure_high;
     }
+    return !(values[V_PRESSURE] < low) && !(values[V_PRESSURE] > high);
+}
+
+int not_too_fast(const Laws *laws, const Constants *k, const double *values) {
+    return !(fabs(values[V_SPEED]) > (laws->speed_fitted ? 1.05 * laws->speed[1] : k->fastest));
+}
+
+int speed_allowed(const Laws *laws, const Constants *k, const double *values) {
     double slowest = fmin(k->slowest, 0.95 * laws->speed[0]);
-    double fastest = laws->speed_fitted ? 1.05 * laws->speed[1] : k->fastest;
-    return !(values[V_PRESSURE] < low) && !(values[V_PRESSURE] > high) && !(speed < slowest) &&
-           !(speed > fastest);
+    return !(fabs(values[V_SPEED]) < slowest) && not_too_fast(laws, k, values);
+}
+
+int conditions_allowed(const Laws *laws, const Constants *k, const double *values) {
+    return pressure_allowed(laws, k, values) && speed_allowed(laws, k, values);
 }
 
 double speed_departure(const Laws *laws, const Constants *k, const double *values) {

@@ -8,6 +8,9 @@
 double load_correction(const Laws *laws, const Constants *k, const double *values, double *std);
 double force_factor(const Laws *laws, const Constants *k, const double *values, double *std);
 double equivalent_load(const Laws *laws, double load, const double *values);
+int pressure_allowed(const Laws *laws, const Constants *k, const double *values);
+int not_too_fast(const Laws *laws, const Constants *k, const double *values);
+int speed_allowed(const Laws *laws, const Constants *k, const double *values);
 int conditions_allowed(const Laws *laws, const Constants *k, const double *values);
 double speed_departure(const Laws *laws, const Constants *k, const double *values);
 double speed_spread(const Laws *laws, const Constants *k, const double *values, double value);

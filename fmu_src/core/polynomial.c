@@ -95,10 +95,10 @@ int all_inside(const Guard *guard, const double *values, double own) {
     return 1;
 }
 
-int own_inside(const Guard *guard, double own) {
+int named_inside(const Guard *guard, int number, double value) {
     for (int i = 0; i < guard->ranges; i++) {
         const double *range = guard->range + RANGE_WIDTH * i;
-        if (range[RANGE_NUMBER] < 0.0 && !isnan(own) && !inside(range, own)) return 0;
+        if (range[RANGE_NUMBER] == number && !isnan(value) && !inside(range, value)) return 0;
     }
     return 1;
 }

@@ -23,8 +23,8 @@ double slope_by(const Polynomial *p, const double *values, int value);
 /* Whether a quantity and its regressors lie in their ranges. Reference: all_inside */
 int all_inside(const Guard *guard, const double *values, double own);
 
-/* Whether the quantity itself lies in its calibrated range, or is not known. */
-int own_inside(const Guard *guard, double own);
+/* Whether a value lies in its calibrated range, or is not known; number -1: the quantity itself. */
+int named_inside(const Guard *guard, int number, double value);
 
 /* Whether a combination of two regressors was calibrated; `scratch` holds a double for each point,
  * and for each mirrored one. Reference: Cloud.inside */

@@ -8,6 +8,7 @@
 static const double AFTER = 20.0 * (3.14159265358979323846 / 180.0);
 static const double OFFSET_HALF_WIDTH = 0.5, LARGEST_MISSING = 0.1, LARGEST_PERIOD_RATIO = 2.0;
 static const double DRIFT_SHARE = 0.05, MISSED_RATIO = 1.5, LARGEST_ANGLE_STD = 0.02;
+static const double LARGEST_OMEGA_RATIO = 1.5;
 static const double USUAL_CHANGE = 1.0, LONGEST_TURN = 3.0;
 
 /* The whole part of a sample number; -1 for what no sample number can be. */
@@ -247,13 +248,18 @@ static void first_turn(const Cutter *c, const Contact *contact, Turn *turn) {
     nothing_known(turn, c->gages);
     turn->time = contact_middle(contact) / c->rate;
     turn->ready = contact->fall / c->rate;
-    turn->flags = FIRST_TURN;
+    turn->flags = FIRST_TURN | (contact->burst ? SPIKE : 0);
 }
 
 /* Conditions over the turn and in its contact. */
 static void take_conditions(const Cutter *c, const Contact *contact, double start, double stop,
                             Turn *turn) {
     double speed = held_mean(c, SPEED, start, stop);
+    double omega = held_mean(c, OMEGA, start, stop);
+    double turned = fabs(omega) * (stop - start) / (2.0 * PI * c->rate);
+    if (!(turn->flags & FIRST_TURN) &&
+        (turned > LARGEST_OMEGA_RATIO || turned < 1.0 / LARGEST_OMEGA_RATIO))
+        turn->flags |= OMEGA_MISMATCH;
     turn->pressure = held_mean(c, PRESSURE, start, stop);
     turn->tread_depth = held_mean(c, TREAD_DEPTH, start, stop);
     turn->tread_temperature = held_mean(c, TREAD_TEMPERATURE, start, stop);
@@ -322,6 +328,7 @@ static int full_turn(Cutter *c, const Contact *contact, const Contact *before, T
     int missed = ratio > MISSED_RATIO && gap_in(c, (int64_t)before->fall, (int64_t)contact->rise);
     if (contact->damaged || before->damaged || missed)
         turn->flags |= FIRST_TURN | GAP; /* its period is unknown */
+    if (contact->burst || (before->burst && before->damaged)) turn->flags |= SPIKE;
     turn->time = stop / c->rate;
     turn->ready = (double)(c->stop - 1) / c->rate;
     turn->period = period / c->rate;
@@ -350,7 +357,7 @@ static Contact taken_from_queue(Cutter *c) {
     Contact contact = c->waiting[c->next];
     c->next = (c->next + 1) % c->places;
     c->queued--;
-    contact.damaged = damaged(c, &contact);
+    contact.damaged = contact.damaged || damaged(c, &contact);
     c->stage = UNSEEN;
     return contact;
 }

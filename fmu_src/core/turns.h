@@ -8,9 +8,6 @@
 #include "lowpass.h"
 #include "slip.h"
 
-/* Samples before an edge that must not be missing. */
-enum { NEAR_EDGE = 3 };
-
 /* Turn of the reference, same names and units; arrays over gages, and over wheel angles. What comes
  * before the curves stands in TurnHead in the same order. */
 typedef struct {

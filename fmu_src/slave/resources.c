@@ -1,5 +1,6 @@
 #include "resources.h"
 
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -80,10 +81,16 @@ static const char *line(char **at, const char *end) {
     return begin;
 }
 
-/* Take the lines; returns whether they are complete. */
+/* Whether what follows the first line has the hash that stands in it, if one does. */
+static int undamaged(const char *hash, const char *rest, size_t n) {
+    char sum[18];
+    snprintf(sum, sizeof sum, " %016" PRIx64, state_hash(rest, n));
+    return !*hash || !strcmp(hash, sum);
+}
+
+/* Take the lines behind the first; returns whether they are complete. */
 static int lines_read(Resources *r, char **at, const char *end) {
-    const char *format = line(at, end), *count;
-    if (!format || strcmp(format, FORMAT)) return 0;
+    const char *count;
     r->guid = line(at, end);
     r->tire = line(at, end);
     count = line(at, end);
@@ -105,9 +112,14 @@ const char *resources_read(Resources *r, const char *path) {
     r->memory = bytes_of(path, &n);
     if (!r->memory) return MISSING;
     char *at = r->memory, *end = r->memory + n;
+    const char *format = line(&at, end);
+    size_t length = sizeof FORMAT - 1;
+    if (!format || strncmp(format, FORMAT, length)) return "is no tirelib-core/1";
+    int whole = undamaged(format + length, at, (size_t)(end - at));
     if (!lines_read(r, &at, end)) return "is no tirelib-core/1";
     if ((size_t)(end - at) < sizeof head || (size_t)(end - at) % sizeof(double))
         return "is cut off";
+    if (!whole) return "is damaged";
     memcpy(head, at, sizeof head);
     at += sizeof head;
     r->samples = head[0];

@@ -1,7 +1,7 @@
 /* Files that the core reads: what an FMU carries, and other calibrations.
  *
- * Lines of text, then doubles. The lines: the format, the GUID (for no FMU: the table's hash), the
- * tire's name, how many variables there are, then one line each: R, I, B or S for its type, p, i or
+ * Lines of text, then doubles. The lines: the format (in an FMU, with the hash of all that follows),
+ * the GUID (for no FMU: the table's hash), the tire's name, how many variables there are, then one line each: R, I, B or S for its type, p, i or
  * o for parameter, input or output, and its name. The doubles: samples of a frame, whether it is
  * buffered, sample rate, what stands for a missing value, then the calibration's table. Written by
  * tirelib.fmu.native. */
@@ -9,6 +9,7 @@
 #define TIRE_RESOURCES_H
 
 #include "../core/calibration.h"
+#include "../core/state.h"
 
 typedef struct {
     char *memory; /* of all texts */

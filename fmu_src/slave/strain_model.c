@@ -15,12 +15,14 @@ static const char *const FLAGS[] = {
     "dead_gage",    "period_jump",  "trigger_mismatch", "drift",         "no_speed",
     "reversed",     "out_of_range", "cut_off",          "reduced_gages", "too_few_gages",
     "no_condition", "weak_edge",    "no_contact",       "fault",         "accelerating",
-    "other_tire"};
+    "other_tire",   "omega_mismatch"};
 static const char *const NOTES[] = {"Fz_out_of_range",         "alpha_out_of_range",
                                     "kappa_out_of_range",      "Fy_out_of_range",
                                     "alpha_saturated",         "condition_extrapolated",
                                     "camber_unknown",          "friction_implausible",
-                                    "tread_depth_implausible", "tread_temperature_implausible"};
+                                    "tread_depth_implausible", "tread_temperature_implausible",
+                                    "pressure_out_of_range",   "speed_out_of_range",
+                                    "camber_out_of_range"};
 
 /* Write the outputs. Reference: GuardedSlave.publish, StrainTire.shown */
 static void publish(Slave *s) {

@@ -204,6 +204,68 @@ def test_a_speed_that_says_nothing_is_flagged(ten: LoadedFmu, speed: float, flag
     assert np.isnan(last["kappa"])
 
 
+@pytest.mark.parametrize("at", [3.1, 3.42, 3.5, 3.6, 3.95])
+@pytest.mark.parametrize("height", [0.05, -0.03])
+def test_a_burst_costs_the_turn_it_lies_in_and_at_most_one_more(
+    ten: LoadedFmu, at: float, height: float
+) -> None:
+    """Three samples of the centre gage, higher than a contact; the contact is at 3.5 turns."""
+    samples = strain(turns=9.4)
+    first = int(at * 2.0 * np.pi * live.RADIUS / live.SPEED * live.RATE)
+    samples[2, first : first + 3] = height
+    ten.start(live.RATE)
+    seen = play(ten, samples)
+    turns = {v["turn"] for v in seen}
+    valid = {v["turn"] for v in seen if v["valid"]}
+    assert turns - valid <= {0, 1, 4, 5}
+    burst = [v["status"] for v in seen if v["turn"] in {4, 5}]
+    assert any("spike" in status for status in burst)
+    assert not any(v["status"] == "first_turn" for v in seen if v["turn"] > 1)
+
+
+def beyond(note: str, **known: float) -> tuple[str, dict[str, float], set[str]]:
+    wrong = {"kappa"} if note == "speed" and known["speed"] < live.SPEED else set()
+    return f"{note}_out_of_range", known, wrong | ({"kappa"} if note == "camber" else set())
+
+
+@pytest.mark.parametrize(
+    ("note", "known", "valid"),
+    [
+        beyond("pressure", pressure=2.3),
+        beyond("pressure", pressure=0.0),
+        beyond("pressure", pressure=33.0),
+        beyond("pressure", pressure=-live.PRESSURE),
+        beyond("speed", speed=65.0),
+        beyond("speed", speed=1.0),
+        beyond("camber", camber=2.0),
+        beyond("camber", camber=-0.5),
+    ],
+)
+def test_a_condition_that_cannot_be_is_named_and_what_depends_on_it_is_not_valid(
+    ten: LoadedFmu, note: str, known: dict[str, float], valid: set[str]
+) -> None:
+    ten.start(live.RATE)
+    seen = [v for v in play(ten, strain(), held(**known)) if v["turn"] > 1]
+    assert seen
+    assert not any(v["valid"] for v in seen)
+    for values in seen:
+        assert {note, "out_of_range"} <= set(values["status"].split(";"))
+        assert {name for name in QUANTITIES if values[f"{name}_valid"]} <= valid
+
+
+@pytest.mark.parametrize("factor", [30.0 / np.pi, 0.5 / np.pi, -9.0, 1.6])
+def test_a_turn_rate_that_contradicts_the_contacts_is_named_and_nothing_is_valid(
+    ten: LoadedFmu, factor: float
+) -> None:
+    rate = live.SPEED / live.RADIUS
+    ten.start(live.RATE)
+    last = play(ten, strain(), held(omega=factor * rate))[-1]
+    assert last["status"] == "omega_mismatch"
+    assert not any(last[f"{name}_valid"] for name in QUANTITIES)
+    ten.start(live.RATE)
+    assert play(ten, strain(), held(omega=1.2 * rate))[-1]["valid"]
+
+
 def test_a_measured_standstill_drops_validity(ten: LoadedFmu) -> None:
     samples = strain(turns=3.0)
     ten.start(live.RATE)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from fmpy import extract, read_model_description
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 
 from tests.fmu import live, virtual_host
@@ -69,6 +70,26 @@ def test_a_state_rolls_back_exactly_and_survives_reset_and_serialisation(fmu: Lo
     assert same(play(fmu, samples[:, 1130:]), wanted)
     for used in (state, again):
         fmu.slave.freeFMUState(used)
+
+
+@pytest.mark.parametrize("at", [5, 200, -40, None])
+def test_a_damaged_state_is_refused_in_the_same_words_and_nothing_changes(
+    fmu: LoadedFmu, at: int | None
+) -> None:
+    fmu.start(live.RATE)
+    play(fmu, strain())
+    now = fmu.read()
+    text = bytearray(fmu.slave.serializeFMUState(fmu.slave.getFMUState()))
+    if at is None:
+        del text[-7:]
+    else:
+        text[at] ^= 1
+    with pytest.raises(FMICallException, match="fmi2SetFMUstate failed with status 3"):
+        fmu.slave.setFMUState(fmu.slave.deSerializeFMUstate(bytes(text)))
+    assert fmu.messages[-1].startswith(
+        "FormatError: the bytes are not a saved state of this FMU; save the state again"
+    )
+    assert same([fmu.read()], [now])
 
 
 def python_file(samples: int) -> Path:

@@ -135,6 +135,7 @@ SEEN = {
     *("OUT_OF_RANGE", "OTHER_TIRE", "TOO_FEW_GAGES", "NO_CONDITION", "alpha_saturated"),
     *("condition_extrapolated", "camber_unknown", "friction_implausible"),
     *("tread_depth_implausible", "tread_temperature_implausible"),
+    *("pressure_out_of_range", "speed_out_of_range", "camber_out_of_range"),
     *(f"{quantity}_out_of_range" for quantity in ("Fz", "alpha", "kappa", "Fy")),
 }
 

@@ -312,6 +312,24 @@ def test_another_calibration_written_before_it_held_a_hash_is_taken(
     assert "is damaged" in host.said[-1]
 
 
+@pytest.mark.parametrize("at", [-16, 17, 60], ids=["a number", "the hash", "a name"])
+def test_data_with_one_wrong_bit_are_refused(folder: Path, tmp_path: Path, at: int) -> None:
+    core = tmp_path / "StrainTire.core"
+    written = bytearray((folder / "resources" / core.name).read_bytes())
+    written[at] ^= 1
+    core.write_bytes(written)
+    host = Host(folder, place=tmp_path.as_uri())
+    assert not host.slave.component
+    assert "StrainTire.core is damaged; unpack the whole FMU" in host.said[-1]
+
+
+def test_data_written_before_they_held_a_hash_are_taken(folder: Path, tmp_path: Path) -> None:
+    core = tmp_path / "StrainTire.core"
+    first, _, rest = (folder / "resources" / core.name).read_bytes().partition(b"\n")
+    core.write_bytes(first.split()[0] + b"\n" + rest)
+    Host(folder, place=tmp_path.as_uri()).start()
+
+
 @pytest.mark.parametrize("place", [*(f"binaries/{name}" for name in BINARIES), GATE])
 def test_the_binaries_were_made_from_the_sources(place: str) -> None:
     said = f"source sha256 {native_fmu.BINARIES[place].source_hash()}".encode()

@@ -131,6 +131,9 @@ def spoilt(fault: str) -> tuple[np.ndarray, np.ndarray]:
         strain[2, at - 5] += 0.02
         strain[3, at::97] -= 0.01
         strain[0, at : at + 4] += 0.02
+    elif fault.startswith("burst"):
+        first, n, height = (float(word) for word in fault.split()[1:])
+        strain[2, at + int(first) : at + int(first) + int(n)] = height
     elif fault == "frozen":
         strain[0, at:] = strain[0, at]
     elif fault == "dead":
@@ -138,7 +141,7 @@ def spoilt(fault: str) -> tuple[np.ndarray, np.ndarray]:
     elif fault == "two dead":
         strain[3:] = 2.7e-3
     elif fault == "centre dead":
-        strain[2, at:] = 2.7e-3
+        strain[2, at:] = 2.7e-3 + 1e-9 * np.arange(strain.shape[1] - at)
     elif fault == "clipped":
         strain[1] = np.minimum(strain[1], 8e-3)
     elif fault == "clipped below":
@@ -180,6 +183,11 @@ FAULTS = {
     "gap before the contact": TurnFlag.GAP,
     "lost turn": TurnFlag.FIRST_TURN | TurnFlag.GAP,
     "spikes": TurnFlag.SPIKE,
+    "burst 500 3 0.05": TurnFlag.SPIKE,
+    "burst 500 3 -0.05": TurnFlag.SPIKE,
+    "burst 500 60 0.05": TurnFlag.FIRST_TURN | TurnFlag.SPIKE,
+    "burst -30 5 0.05": TurnFlag.FIRST_TURN | TurnFlag.SPIKE,
+    "burst 0 8 -0.01": TurnFlag.SPIKE | TurnFlag.TOO_FEW_GAGES,
     "frozen": TurnFlag.REDUCED_GAGES,
     "dead": TurnFlag.DEAD_GAGE,
     "two dead": TurnFlag.TOO_FEW_GAGES,
@@ -265,7 +273,8 @@ def sequences(draw: st.DrawFn) -> tuple[np.ndarray, dict[str, Any]]:
         angle = float(phi[-1])
         piece = np.tile(waveform(phi, half=draw(st.floats(0.1, 0.3))), (3, 1))
         piece *= draw(st.sampled_from([1.0, 1.0, 1.2, 0.7, 3.0]))
-        kind = draw(st.sampled_from(["plain"] * 4 + ["gap", "still", "step", "noise", "one lost"]))
+        kinds = ["plain"] * 4 + ["gap", "still", "step", "noise", "one lost", "burst", "burst"]
+        kind = draw(st.sampled_from(kinds))
         if kind == "gap":
             piece[:] = np.nan
         elif kind == "still":
@@ -276,6 +285,11 @@ def sequences(draw: st.DrawFn) -> tuple[np.ndarray, dict[str, Any]]:
             piece += 2e-3 * rng.standard_normal(piece.shape)
         elif kind == "one lost":
             piece[draw(st.integers(0, 2)), ::17] = np.nan
+        elif kind == "burst":
+            first = draw(st.integers(0, n - 1))
+            part = piece[:, first : first + draw(st.integers(1, 30))]
+            part += draw(st.sampled_from([0.05, 0.02, 8e-3, -5e-3, -0.03]))
+            part[draw(st.integers(0, 2)), draw(st.integers(1, 9)) :: 7] = np.nan
         pieces.append((piece, omega))
     strain = np.hstack([piece for piece, _ in pieces])
     strain += 4e-6 * rng.standard_normal(strain.shape)

@@ -255,6 +255,10 @@ class Calibration:
         given = {name: getattr(features, name) for name in PLAUSIBLE}
         wrong = full.road.plausible(given)
         said = {**said, **{f"{name}_implausible": ~good for name, good in wrong.items()}}
+        held = full.conditions_allowed(
+            {name: getattr(features, name) for name in ("pressure", "speed", "camber")}
+        )
+        said |= {f"{name}_out_of_range": ~good for name, good in held.items()}
         for note, rows in said.items():
             for row in np.flatnonzero(rows & measured):
                 notes[row].append(note)

@@ -1,7 +1,8 @@
 """What may be wrong with a calibration file: every fault, before any number of it is used."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,15 @@ REGRESSORS = frozenset(
 QUANTITIES = frozenset(("Fz", "alpha", "kappa", "Fy"))
 BORDER = ("near", "growth", "far")
 """What a model's border says, each from 0."""
+TABLES = ("geometry_m", "filter", "rolling", "chain", "reference_turn")
+"""Tables of a calibration. Others say what it was made from, under any name that is not nearly one
+of these."""
+PARTS = (
+    *("missing_gage", "gages", "mean_load", "laws", "force_laws", "road", "range"),
+    *("cloud", "sliding", "likeness", *UNITS),
+)
+"""What a chain may hold."""
+MODEL = ("unit", "residual", "floor", "pulled", "border", "variable", "term", "covariance")
 HIGHEST_POWER = 12
 FEWEST_POINTS = 64
 """Fewest points of a reference turn."""
@@ -38,6 +48,10 @@ FEWEST_POINTS = 64
 
 def faults(document: Mapping[str, Any]) -> Iterator[str]:
     """Yield every fault of a calibration document, each saying where it is."""
+    for name in set(document) - set(TABLES):
+        if near := get_close_matches(name, TABLES, n=1, cutoff=0.8):
+            yield f"{name}: is unknown; did you mean {near[0]!r}?"
+    yield from _unknown(document.get("filter"), "filter", ("order", "cut_off_hz"))
     if document.get("axes") != AXES:
         yield f"axes = {document.get('axes')!r}; only {AXES!r} is allowed"
     yield from _numbers(document, "filter", ("order",))
@@ -66,6 +80,7 @@ def _chain(chain: Any, where: str, gages: int) -> Iterator[str]:
     if not isinstance(chain, dict):
         yield f"{where}: is no table"
         return
+    yield from _unknown(chain, where, PARTS)
     used = chain.get("gages")
     good = isinstance(used, list) and all(_whole(g, 1, gages) for g in used)
     if not isinstance(used, list) or not good or not len(set(used)) == len(used) >= 2:
@@ -87,6 +102,8 @@ def _chain(chain: Any, where: str, gages: int) -> Iterator[str]:
     for name, unit in UNITS.items():
         if name in chain:
             yield from _model(chain[name], f"{where}.{name}", unit)
+            known = (*MODEL, "blur", "bend") if name == "alpha" else MODEL
+            yield from _unknown(chain[name], f"{where}.{name}", known)
     if "alpha" in chain:
         yield from _numbers(chain, "alpha", ("blur", "bend"), where)
     if "likeness" in chain:
@@ -97,6 +114,16 @@ def _chain(chain: Any, where: str, gages: int) -> Iterator[str]:
         yield from _road(chain["road"], f"{where}.road")
     if "sliding" in chain:
         yield from _sliding(chain["sliding"], f"{where}.sliding")
+
+
+def _unknown(table: Any, where: str, known: Iterable[str]) -> Iterator[str]:
+    """Yield the names that a table may not hold, each with the nearest that it may."""
+    names = [*known]
+    for name in table if isinstance(table, dict) else ():
+        if name not in names:
+            near = get_close_matches(name, names, n=1, cutoff=0.5)
+            told = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names)}"
+            yield f"{where}.{name}: is unknown; {told}"
 
 
 def _road(table: Any, where: str) -> Iterator[str]:

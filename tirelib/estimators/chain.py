@@ -99,6 +99,22 @@ class Chain:
         model = {"Fz": self.load, "kappa": self.radius, "Fy": self.force, "alpha": self.angle}
         return model[quantity] is not None
 
+    def conditions_allowed(self, values: Mapping[str, FloatArray]) -> dict[str, BoolArray]:
+        """Tell for pressure, speed and camber which turns the calibration holds for.
+
+        Unknown ones count as allowed; where they are needed, the turn is told by `no_condition`.
+        """
+        laws = (self.laws, self.force_laws) if self.has("Fy") else (self.laws,)
+        camber = values["camber"]
+        upright = tuple(guard for guard in self.guards["Fy"] if guard.name == "camber")
+        inside = np.isnan(camber)
+        inside |= all_inside(upright, [camber]) if upright else True
+        return {
+            "pressure": np.logical_and.reduce([law.pressure_allowed(values) for law in laws]),
+            "speed": np.logical_and.reduce([law.speed_allowed(values) for law in laws]),
+            "camber": inside,
+        }
+
     def unlike(
         self,
         moved: Mapping[str, FloatArray],
@@ -172,7 +188,9 @@ class Chain:
             kappa = np.where(values["speed"] > 0.0, kappa, np.nan)
             std = np.abs(gain) * radius_std
             values["slip_ratio"], values["slip_std"] = kappa, std
-            valid = self._valid("kappa", values, kappa, std, near) & plausible
+            # the radius depends on the pressure; at a low speed it is what it is at a higher one
+            held = self.laws.pressure_allowed(values) & self.laws.not_too_fast(values)
+            valid = self._valid("kappa", values, kappa, std, near) & plausible & held
             result["kappa"] = Estimate(kappa, std, valid)
         values["slip_size"] = np.abs(values["slip_ratio"])
         if self.force is not None:

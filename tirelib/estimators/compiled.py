@@ -27,6 +27,7 @@ NOTES = (
     *(f"{quantity}_out_of_range" for quantity in QUANTITIES),
     *("alpha_saturated", "condition_extrapolated", "camber_unknown"),
     *("friction_implausible", "tread_depth_implausible", "tread_temperature_implausible"),
+    *("pressure_out_of_range", "speed_out_of_range", "camber_out_of_range"),
 )
 """Notes by the number of their bit in ``estimates.h``."""
 ROLLING = ("unknown", "free", "braking", "driving")

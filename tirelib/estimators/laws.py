@@ -125,18 +125,28 @@ class ConditionLaws:
 
     def allowed(self, values: Mapping[str, FloatArray]) -> BoolArray:
         """Tell which turns lie within the envelope of the conditions; unknown ones do."""
-        pressure, speed = values["pressure"], values["speed"]
+        return self.pressure_allowed(values) & self.speed_allowed(values)
+
+    def pressure_allowed(self, values: Mapping[str, FloatArray]) -> BoolArray:
+        """Tell which turns have a pressure for which the calibration holds; unknown ones have."""
         low, high = self.pressure
         if not self.pressure_fitted:
             low, high = low * PRESSURE_ENVELOPE[0], high * PRESSURE_ENVELOPE[1]
         else:
             slack = CALIBRATED_SLACK * (high - low)
             low, high = low - slack, high + slack
-        good = ~(pressure < low) & ~(pressure > high)
-        slowest, fastest = np.fmin(SLOWEST, 0.95 * self.speed[0]), FASTEST
-        if self.speed_fitted:
-            fastest = 1.05 * self.speed[1]
-        good &= ~(np.abs(speed) < slowest) & ~(np.abs(speed) > fastest)
+        good = ~(values["pressure"] < low) & ~(values["pressure"] > high)
+        return np.asarray(good, dtype=np.bool_)
+
+    def not_too_fast(self, values: Mapping[str, FloatArray]) -> BoolArray:
+        """Tell which turns are no faster than the calibration holds; unknown ones are not."""
+        fastest = 1.05 * self.speed[1] if self.speed_fitted else FASTEST
+        return np.asarray(~(np.abs(values["speed"]) > fastest), dtype=np.bool_)
+
+    def speed_allowed(self, values: Mapping[str, FloatArray]) -> BoolArray:
+        """Tell which turns have a speed for which the calibration holds; unknown ones have."""
+        slowest = np.fmin(SLOWEST, 0.95 * self.speed[0])
+        good = ~(np.abs(values["speed"]) < slowest) & self.not_too_fast(values)
         return np.asarray(good, dtype=np.bool_)
 
     def spread(self, values: Mapping[str, FloatArray], value: FloatArray) -> FloatArray:

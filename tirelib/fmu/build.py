@@ -52,8 +52,7 @@ def build_fmu(
         Whether Python computes in the FMU, where it runs, instead of the compiled core.
     sealed : bool
         Whether the FMU leaves out the calibration file (names and statistics of the campaigns, a
-        measured turn): the core's table of numbers is inside only. Its reference signals are made
-        up then.
+        measured turn): the core's table of numbers is inside only, and no reference signals.
     fmi : int
         Version of FMI: 2, or 3 with arrays and a clock.
     progress : callable, optional

@@ -245,7 +245,7 @@ def _compare(path: Path, folder: Path, document: dict[str, Any], names: list[str
             with zipfile.ZipFile(path) as archive:
                 text = archive.read(f"{place}.csv").decode("utf-8", "replace")
     if text is None:
-        if document["made_by_tirelib"] and model is not None:
+        if document["made_by_tirelib"] and model is not None and not _sealed(path):
             _add(
                 document,
                 "reference",
@@ -277,6 +277,13 @@ def _compare(path: Path, folder: Path, document: dict[str, Any], names: list[str
         if bad
         else f"{len(rows)} outputs at {len(wanted)} points agree with the reference signals",
     )
+
+
+def _sealed(path: Path) -> bool:
+    """Tell whether an FMU of this library was built to hold no reference signals."""
+    with zipfile.ZipFile(path) as archive:
+        settings = json.loads(archive.read("resources/settings.json"))
+    return isinstance(settings, dict) and settings.get("sealed") is True
 
 
 def _table(text: str) -> tuple[list[str], Any]:

@@ -83,7 +83,7 @@ def pack(
         computing["sources/buildDescription.xml"] = build_description(spec.model, sources)
     identity = identity_of(spec, {**computing, "data": data.tobytes()})
     usual = {"buffered": 0.0, "missing": math.nan}
-    core = resource_file(
+    core = hashed_file(
         title,
         data,
         guid=identity.guid,
@@ -136,6 +136,20 @@ def _hash(data: bytes) -> int:
     for byte in data:
         found = (found ^ byte) * 1099511628211 % (1 << 64)
     return found
+
+
+def hashed_file(
+    title: str,
+    data: FloatArray,
+    *,
+    guid: str,
+    table: Sequence[Variable],
+    numbers: Sequence[float],
+) -> bytes:
+    """Return the file of an FMU: its first line holds the hash of all that follows."""
+    file = resource_file(title, data, guid=guid, table=table, numbers=numbers)
+    rest = file.removeprefix(f"{FORMAT}\n".encode())
+    return f"{FORMAT} {_hash(rest):016x}\n".encode() + rest
 
 
 def resource_file(

@@ -12,13 +12,14 @@ it can be checked and used where pythonfmu is not installed.
 
 import ctypes
 import functools
+import hashlib
 import json
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn, Protocol
 
-from tirelib.errors import FormatError, ParameterError
+from tirelib.errors import FormatError, ParameterError, TirelibError
 from tirelib.fmu.journal import Journal
 from tirelib.fmu.refusals import STEP_REFUSED, StepError, status_entry
 from tirelib.fmu.variables import Variable
@@ -325,6 +326,7 @@ class GuardedSlave:
     @guarded
     def _get_fmu_state(self) -> dict[str, Any]:
         return {
+            "guid": self.guid,
             "real": [None if value is None else float(value).hex() for value in self.real],
             "other": dict(self.other),
             "phase": self._phase,
@@ -334,8 +336,18 @@ class GuardedSlave:
 
     @guarded
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        if "real" not in state or len(state["real"]) != len(self.real):
-            raise FormatError("the bytes are not a saved state of this FMU; save the state again")
+        before = self._get_fmu_state()
+        try:
+            self._take_up(state)
+        except (KeyError, TypeError, ValueError, AttributeError, TirelibError):
+            self._take_up(before)
+            raise FormatError(
+                "the bytes are not a saved state of this FMU; save the state again"
+            ) from None
+
+    def _take_up(self, state: Mapping[str, Any]) -> None:
+        if state["guid"] != self.guid:
+            raise FormatError("a state of another FMU")
         self.real[:] = [None if value is None else float.fromhex(value) for value in state["real"]]
         self.other.update(state["other"])
         self._allow(self._inputs | self._fixed)
@@ -348,12 +360,23 @@ class GuardedSlave:
         self._phase, self._refused = state["phase"], state["refused"]
 
     @staticmethod
+    def _fmu_state_to_bytes(state: Mapping[str, Any]) -> bytes:
+        text = json.dumps(state).encode()
+        return _sum(text) + text
+
+    @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
-        try:
-            content = json.loads(state)
-        except ValueError:
+        """Return a state; an empty one, which is refused as it is set, of damaged bytes."""
+        size = len(_sum(b""))
+        if state[:size] != _sum(state[size:]):
             return {}
-        return content if isinstance(content, dict) else {}
+        found: dict[str, Any] = json.loads(state[size:])
+        return found
+
+
+def _sum(text: bytes) -> bytes:
+    """Return what stands before the bytes of a state, so that damage is seen."""
+    return hashlib.sha256(text).hexdigest().encode()
 
 
 _PHASES = {

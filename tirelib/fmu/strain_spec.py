@@ -3,7 +3,6 @@
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 from tirelib.errors import ParameterError
@@ -75,10 +74,12 @@ def strain_tire(
         *inputs(loaded.lateral, samples_per_step, buffered=buffered, road=loaded.chains[-1].road),
         *outputs(loaded.lateral),
     ]
-    told = replace(loaded, reference=None) if sealed else loaded
-    reference = strain_reference(
-        told, sample_rate, samples_per_step, buffered=buffered, lose=fmi == 2
-    )
+    reference: dict[str, bytes] = {}
+    if not sealed:
+        signals = strain_reference(
+            loaded, sample_rate, samples_per_step, buffered=buffered, lose=fmi == 2
+        )
+        reference = (signals.joined(JOINED) if fmi == 3 else signals).files(MODEL)
     document = tomllib.loads(text)
     if sealed:
         document.pop("data", None)
@@ -91,7 +92,6 @@ def strain_tire(
         "sealed": sealed,
         "fmi": fmi,
     }
-    signals = reference.joined(JOINED) if fmi == 3 else reference
     shown = [one.variable for one in joined(table)] if fmi == 3 else table
     return SlaveSpec(
         model=MODEL,
@@ -102,7 +102,7 @@ def strain_tire(
         settings=settings,
         resources={
             **({} if sealed else {CALIBRATION: text.encode()}),
-            **{f"{FOLDER}/{name}": data for name, data in signals.files(MODEL).items()},
+            **{f"{FOLDER}/{name}": data for name, data in reference.items()},
         },
         documentation={"index.html": _page(loaded, document, shown, settings).encode()},
         icon=source_file("strain_tire.png").read_bytes(),
@@ -149,7 +149,7 @@ def _page(
         "Flags": _flags(),
         **({"Arrays and events": _ARRAYS} if settings["fmi"] == 3 else {}),
         "Limits": _LIMITS.replace("</ul>", _PATHS) if python else _LIMITS,
-        "Check": _CHECK,
+        "Check": _CHECK_SEALED if settings["sealed"] else _CHECK,
     }
     return page(MODEL, lead, facts, table, sections)
 
@@ -236,3 +236,5 @@ _PATHS = """<li>The path of the unpacked FMU may hold spaces, but no other chara
 encodes with a percent sign.</li> </ul>"""
 _CHECK = """<p><code>resources/reference</code> holds input and expected output in the FMI
 cross-check layout; <code>tirelib fmu check X.fmu</code> plays and compares them.</p>"""
+_CHECK_SEALED = """<p>This FMU is sealed, so it holds no reference signals;
+<code>tirelib fmu check X.fmu --reference DIR</code> plays those that its supplier gives.</p>"""

@@ -24,12 +24,26 @@ It must lie above the strain away from the contact, so the dips may be 1.6 times
 pulse is high: beyond what a tire shows, even at half its pressure and 1.5 times its load."""
 JUMP = 2.5
 """A swing this many times the one that set the levels shows that they were set by no contact."""
+SLEW = 32.0
+"""Swings per radian of wheel angle: no edge of a contact is steeper. 2.5 times (`JUMP`) the steepest
+of 537 turns measured on a tire in a laboratory (8.3 to 12.8). What departs faster from the last good
+sample is a burst of disturbance: its samples count as missing, and no level follows them."""
+LEAST_SLEW = 0.1
+"""Share of the swing by which samples may differ however slowly the wheel turns."""
+LONGEST_BURST = 0.02
+"""Turns that a burst lasts at the longest, less than a contact; what lasts longer is believed."""
+NEAR_EDGE = 3
+"""Samples before a pulse's edge that must be there, as the two next to it must, for the edge to
+count."""
 GAP_REACH = 0.1
 """Turns before a pulse and after the one before within which a gap may hide an extreme: the dips
 lie within 0.6 rad of the pulse. The levels then stay as they were. With half and double the same
 turns are valid and as exact (``python build/signal_constants.py``)."""
 MOST_TURNS_WITHOUT_CONTACT = 2.5
 """Turns without a contact after which the search starts again."""
+MOST_PULSES_WITHOUT_CONTACT = 250.0
+"""The same in widths of the pulse, while no turn is known: a pulse takes 1 % of a turn at least, so
+that this is what such a pulse would wait. It ends the wait for a second burst like the first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +58,15 @@ class Contact:
         No valid turn precedes it.
     damaged : bool
         Samples are missing where it begins or ends, so its middle is not to be trusted.
+    burst : bool
+        Samples were left out since the contact before: they departed faster than a tire's do.
     """
 
     rise: float
     fall: float
     fresh: bool
     damaged: bool = False
+    burst: bool = False
 
     @property
     def middle(self) -> float:
@@ -84,6 +101,8 @@ class ContactFinder:
         self._missing = np.empty(
             0, dtype=np.int64
         )  # numbers of samples missing since the last rise
+        self._bursts: tuple[int, int] | None = None  # first and last left out since the last rise
+        self._apart = 0  # samples left out since the last good one
         self._restart()
 
     def _restart(self) -> None:
@@ -97,6 +116,7 @@ class ContactFinder:
         self._before = np.nan  # sample before the current one
         self._last_middle: float | None = None
         self._last_period: float | None = None
+        self._patience = self._longest_turn
         self._since = self._count
 
     @property
@@ -136,6 +156,10 @@ class ContactFinder:
         lowest, highest = min(self._lowest, low), max(self._highest, high)
         if not within or not highest - lowest <= JUMP * self._swing:
             return False
+        if self._last_period is not None:
+            change = float(np.abs(np.diff(x, prepend=self._before)).max())
+            if self._apart or not change <= self._largest_change():
+                return False
         self._lowest, self._highest = lowest, highest
         if self._pulse is not None:
             self._pulse.append(x)
@@ -173,7 +197,7 @@ class ContactFinder:
             self._count += skip
             self._since = self._count
             return start + skip
-        y = self._until_jump(y)
+        y = self._until_jump(self._until_burst(y))
         if self._level is None:
             lows = np.minimum(np.minimum.accumulate(y), self._lowest)
             highs = np.maximum(np.maximum.accumulate(y), self._highest)
@@ -208,6 +232,30 @@ class ContactFinder:
             self._finish(found)
         return start + taken.size
 
+    def _largest_change(self) -> float:
+        """Return how far a sample may be from the good one before it."""
+        if self._last_period is None:
+            return np.inf
+        step = 2.0 * np.pi / self._last_period
+        return self._swing * max(LEAST_SLEW, SLEW * step)
+
+    def _until_burst(self, y: FloatArray) -> FloatArray:
+        """Return the samples before a burst, or the good sample that stands for one within it."""
+        if self._level is None or self._last_period is None:
+            self._apart = 0
+            return y
+        wild = np.abs(np.diff(y, prepend=self._before)) > self._largest_change()
+        for lost in self._missing[self._missing >= self._count] - self._count:
+            wild[max(lost - 2, 0) : lost + 1] = False  # the median has a sample that is missing
+        if wild[0] and self._apart < LONGEST_BURST * self._last_period:
+            self._apart += 1
+            number = self._count + 1  # the median of three lags by one sample
+            self._bursts = (self._bursts[0] if self._bursts else number, number)
+            return np.array([self._before])
+        self._apart = 0
+        wild[0] = False
+        return y[: int(np.argmax(wild))] if wild.any() else y
+
     def _until_jump(self, y: FloatArray) -> FloatArray:
         """Return the samples before the swing outgrows the levels; go to start-up if it has."""
         if self._level is None:
@@ -227,14 +275,13 @@ class ContactFinder:
 
     def _room(self) -> int:
         """Return the samples left until patience ends."""
-        patience = self._longest_turn
-        if self._last_period is not None:
-            patience = min(patience, int(MOST_TURNS_WITHOUT_CONTACT * self._last_period))
-        return max(1, self._since + patience - self._count)
+        return max(1, self._since + self._patience - self._count)
 
     def _extreme_hidden(self) -> bool:
         """Tell whether samples are missing where the turn's extremes may have been."""
         missing = self._missing[self._missing < self._count]
+        if self._bursts is not None:
+            missing = np.append(missing, self._bursts)
         if self._last_period is None or missing.size == 0:
             return missing.size > 0
         reach = GAP_REACH * self._last_period
@@ -266,12 +313,23 @@ class ContactFinder:
         rise = i - 1 + (level - pulse[i - 1]) / (pulse[i] - pulse[i - 1])
         fall = j + (pulse[j] - level) / (pulse[j] - pulse[j + 1])
         shift = self._pulse_start + 1  # the median of three lags by one sample
-        contact = Contact(float(rise + shift), float(fall + shift), fresh)
+        bursts = self._bursts
+        damaged = bursts is not None and bursts[1] >= int(rise + shift) - NEAR_EDGE
+        contact = Contact(
+            float(rise + shift), float(fall + shift), fresh, damaged, bursts is not None
+        )
         self._missing = self._missing[self._missing > contact.rise]
+        if bursts is not None:
+            within = bursts[1] > contact.rise
+            self._bursts = (max(bursts[0], int(contact.rise) + 1), bursts[1]) if within else None
         self._since = self._count
         if fresh or self._last_middle is None:
             self._last_period = None
+            width = contact.fall - contact.rise  # after a jump, patience is what it was
+            self._patience = int(min(self._patience, MOST_PULSES_WITHOUT_CONTACT * width))
         else:
             self._last_period = contact.middle - self._last_middle
+            turns = MOST_TURNS_WITHOUT_CONTACT * self._last_period
+            self._patience = int(min(self._longest_turn, turns))
         self._last_middle = contact.middle
         found.append(contact)

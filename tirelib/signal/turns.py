@@ -27,7 +27,7 @@ from tirelib.flags import TurnFlag
 from tirelib.held import HELD, Held
 from tirelib.signal.angle import SOURCES, AngleLaw, Past, angle_law, minmod
 from tirelib.signal.compiled import Record, cut_by_core
-from tirelib.signal.contacts import Contact, ContactFinder
+from tirelib.signal.contacts import NEAR_EDGE, Contact, ContactFinder
 from tirelib.signal.course import course
 from tirelib.signal.lowpass import LowPass, half_width, smooth_to_angle
 from tirelib.signal.quality import UNUSABLE, inspect, without_contact
@@ -43,13 +43,14 @@ OFFSET_HALF_WIDTH = 0.5
 LARGEST_MISSING = 0.1
 """Share of missing samples with which an offset or a mean is still formed."""
 LARGEST_PERIOD_RATIO = 2.0
-NEAR_EDGE = 3
-"""Samples before a pulse's edge that must be there, as the two next to it must, for the edge to
-count."""
 DRIFT_SHARE = 0.05
 MISSED_RATIO = 1.5
 """A turn with a gap that lasts this many times the one before has hidden a contact in it: two turns
 last twice as long. ``python build/signal_constants.py`` has half and double."""
+LARGEST_OMEGA_RATIO = 1.5
+"""Measured turn rate over that which the contacts give, or the other way round, beyond which it is
+a wrong unit or another wheel's: 30/pi for revolutions a minute, 2 pi for those a second. A sensor
+that is held for 0.1 s differs by 1.1 where a wheel at 14 m/s brakes with 8 m/s^2."""
 LARGEST_ANGLE_STD = 0.02
 """Relative uncertainty of the wheel angle's scale beyond which a turn is `accelerating`."""
 USUAL_CHANGE = 1.0
@@ -169,7 +170,7 @@ class TurnCutter:
         contact, before = self._waiting[0], self._previous
         if contact.fresh or before is None:
             self._waiting.popleft()
-            self._previous = replace(contact, damaged=self._damaged(contact))
+            self._previous = self._inspected(contact)
             self._previous_period, self._past = np.nan, ()
             self._offsets = self._nothing_read()
             self._rolled = NOTHING
@@ -178,7 +179,7 @@ class TurnCutter:
         if law is None or stop > self._base + self._filled:
             return None
         self._waiting.popleft()
-        contact = replace(contact, damaged=self._damaged(contact))
+        contact = self._inspected(contact)
         self._previous = contact
         turn = self._full_turn(contact, before, law, stop)
         self._previous_period = contact.middle - before.middle
@@ -236,14 +237,14 @@ class TurnCutter:
         end = float(seen[-1] if seen.size else PHI[0])
         return int(law.sample(end + half_width(sigma)) + 2.0) + 1
 
-    def _damaged(self, contact: Contact) -> bool:
-        """Return whether samples of the centre gage are missing at the ends of the contact."""
+    def _inspected(self, contact: Contact) -> Contact:
+        """Return a contact as damaged where samples of the centre gage are missing at its ends."""
         for edge in (contact.rise, contact.fall):
             near = int(edge) - self._base
             part = self._buffer[self._centre, max(near - NEAR_EDGE, 0) : near + 2]
             if not np.isfinite(part).all():
-                return True
-        return False
+                return replace(contact, damaged=True)
+        return contact
 
     def _gap_between(self, before: Contact, contact: Contact) -> bool:
         """Tell whether samples of the centre gage are missing between two contacts."""
@@ -275,7 +276,7 @@ class TurnCutter:
             strain=empty,
             rate=empty,
             gage_flags=np.zeros(self._gages, dtype=np.int64),
-            flags=int(TurnFlag.FIRST_TURN),
+            flags=int(TurnFlag.FIRST_TURN | (TurnFlag.SPIKE if contact.burst else 0)),
         )
 
     def _full_turn(self, contact: Contact, before: Contact, law: AngleLaw, stop: int) -> Turn:
@@ -292,6 +293,8 @@ class TurnCutter:
         missed = ratio > MISSED_RATIO and self._gap_between(before, contact)
         if contact.damaged or before.damaged or missed:
             flags |= TurnFlag.FIRST_TURN | TurnFlag.GAP  # its period is unknown
+        if contact.burst or (before.burst and before.damaged):
+            flags |= TurnFlag.SPIKE
         pulse = _pulse(contact, law)
         if np.isnan(pulse):
             flags |= TurnFlag.ACCELERATING  # so much that its angle is unknown
@@ -313,6 +316,11 @@ class TurnCutter:
         )
         known = dict(zip(HELD, conditions.tolist(), strict=True))
         speed = known["speed"]
+        turned = np.abs(known["omega"]) * period / (2.0 * np.pi * self.rate)
+        if not flags & TurnFlag.FIRST_TURN and (
+            turned > LARGEST_OMEGA_RATIO or turned < 1.0 / LARGEST_OMEGA_RATIO
+        ):
+            flags |= TurnFlag.OMEGA_MISMATCH
         camber, friction = (
             self._in_contact(self._gages + HELD.index(name), contact)
             for name in ("camber", "friction")

@@ -28,6 +28,16 @@ def put(*path: str | int, value: object) -> Edit:
     return edit
 
 
+def moved(place: tuple[str | int, ...], name: str, other: str) -> Edit:
+    def edit(document: dict[str, Any]) -> None:
+        table: Any = document
+        for step in place:
+            table = table[step]
+        table[other] = table.pop(name)
+
+    return edit
+
+
 CLOUD = {
     "names": ["traction", "cp1_slope"],
     "scale": [1.0, 1.0],
@@ -66,6 +76,12 @@ FAULTS: dict[str, tuple[Edit, str]] = {
     "turn's gages": (put("reference_turn", "strain", value=[[1] * 99]), "5 rows of equally many"),
     "turn's hole": (put("reference_turn", "strain", 1, 7, value=float("nan")), "finite numbers"),
     "turn's length": (put("reference_turn", "strain", 1, value=[1] * 99), "equally many"),
+    "table": (moved((), "filter", "filters"), "filters: is unknown; did you mean 'filter'?"),
+    "turn's name": (moved((), "reference_turn", "reference_trun"), "you mean 'reference_turn'?"),
+    "cut-off": (put("filter", "cutoff_hz", value=9.0), "filter.cutoff_hz: is unknown; did you"),
+    "likeness": (moved(("chain", 0), "likeness", "likenes"), "likenes: is unknown; did you mean"),
+    "no part": (put("chain", 0, "extra", value=1), "chain[0].extra: is unknown; there are"),
+    "border": (put(*FZ, "boarder", value={}), "Fz.boarder: is unknown; did you mean 'border'?"),
     "twice": (put("chain", 1, "missing_gage", value=0), "each once"),
 }
 

@@ -149,3 +149,34 @@ def test_a_gap_that_hides_an_extreme_moves_no_later_contact(start: int) -> None:
     found = middles(ContactFinder(int(3 * RATE)).push(holed))
     assert len(found) == len(clean)
     np.testing.assert_allclose(found[3:], clean[3:], atol=0.02)
+
+
+@pytest.mark.parametrize("at", [0.02, 0.1, 0.3, 0.46, 0.5, 0.54, 0.62, 0.9])
+@pytest.mark.parametrize("length", [2, 3, 10, 20])
+@pytest.mark.parametrize("height", [0.05, 0.014, -0.03, -0.005])
+def test_a_short_burst_moves_no_other_contact(at: float, length: int, height: float) -> None:
+    """Levels learned from it would be crossed by no contact for the 3 s of the longest turn."""
+    strain, _, omega = record(turns=12, noise=4e-6)
+    period = 2 * np.pi / omega * RATE
+    clean = ContactFinder(int(3 * RATE)).push(strain[2])
+    disturbed = strain[2].copy()
+    start = int((5.0 + at) * period)  # a contact is at 0.5
+    disturbed[start : start + length] = height
+    found = ContactFinder(int(3 * RATE)).push(disturbed)
+    middle = np.array(middles(found))
+    others = [contact for contact in clean if abs(contact.middle - start) > 0.2 * period]
+    away = [float(np.abs(middle - contact.middle).min()) for contact in others]
+    assert max(away) < 0.1
+    assert len(found) <= len(clean)
+    assert sum(contact.burst for contact in found) >= 1
+    assert sum(contact.fresh for contact in found) == 1
+
+
+@pytest.mark.parametrize("turn", [0.3, 1.1, 1.9])
+def test_a_burst_before_a_turn_is_known_costs_few_turns(turn: float) -> None:
+    strain, _, omega = record(turns=14)
+    period = 2 * np.pi / omega * RATE
+    disturbed = strain[2].copy()
+    disturbed[int(turn * period) : int(turn * period) + 3] = 0.05
+    found = ContactFinder(int(3 * RATE)).push(disturbed)
+    assert sum(not contact.fresh and contact.middle > 3.0 * period for contact in found) >= 9
