@@ -11,9 +11,9 @@
 /* Where the strain crosses the level, [samples since the start]; Contact of the reference. */
 typedef struct {
     double rise, fall;
-    int fresh;   /* no valid turn precedes it */
-    int damaged; /* samples are missing where it begins or ends */
-    int burst;   /* samples were left out since the contact before */
+    int fresh;     /* no valid turn precedes it */
+    int damaged;   /* samples are missing where it begins or ends */
+    int64_t burst; /* samples were left out since the contact before; so wide, as states have no gaps */
 } Contact;
 
 /* Samples before an edge that must not be missing. */

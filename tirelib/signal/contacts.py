@@ -25,9 +25,10 @@ pulse is high: beyond what a tire shows, even at half its pressure and 1.5 times
 JUMP = 2.5
 """A swing this many times the one that set the levels shows that they were set by no contact."""
 SLEW = 32.0
-"""Swings per radian of wheel angle: no edge of a contact is steeper. 2.5 times (`JUMP`) the steepest
-of 537 turns measured on a tire in a laboratory (8.3 to 12.8). What departs faster from the last good
-sample is a burst of disturbance: its samples count as missing, and no level follows them."""
+"""Swings per radian of wheel angle: no edge of a contact is steeper. 2.5 times (`JUMP`) the
+steepest of 537 turns measured on a tire in a laboratory (8.3 to 12.8). What departs faster from the
+last good sample is a burst of disturbance: its samples count as missing, and no level follows
+them."""
 LEAST_SLEW = 0.1
 """Share of the swing by which samples may differ however slowly the wheel turns."""
 LONGEST_BURST = 0.02
