@@ -20,23 +20,19 @@ from tests.magic_sweep import _force
 from tirelib.arrays import FloatArray
 from tirelib.compare.force_model import ForceModel
 from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force
+from tirelib.diagnose.forces.fit import Problem
+from tirelib.diagnose.forces.models import plain_tires
 from tirelib.effects import CATALOGUE
 from tirelib.identify.brush_fit import fit_brush
 from tirelib.identify.brush_model import BrushModel
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.force_points import force_points
 from tirelib.infer.problem import Point
+from tirelib.infer.select import Hypotheses
 from tirelib.planning.envelope import Envelope
-from tirelib.planning.force_rivals import (
-    ForceTrial,
-    force_axes,
-    force_envelope,
-    points_ahead,
-    structure_rows,
-    try_force_suspects,
-)
-from tirelib.planning.next_test import force_next_test
+from tirelib.planning.force_runs import bench_ahead, force_axes, force_envelope
+from tirelib.planning.next_test import next_test
+from tirelib.planning.suspects import given_suspects
 from tirelib.problems.forces import ForceProblem
 
 NOISE = 8.0
@@ -196,24 +192,27 @@ def case_of(data: ForceData) -> ForceCase:
     return ForceCase("steady", model, problem, problem, NOISE, len(problem) // 2, ())
 
 
+def hypotheses_of(case: ForceCase) -> Hypotheses:
+    """Return the hypotheses about a campaign."""
+    return Hypotheses(case.as_given(list(CATALOGUE.values())), plain_tires("Fy"))
+
+
 def tire_of(test: PairCase) -> Tire:
     """Return the tire with the effect at the strength of the wanted visibility.
 
-    That is the chi-square, in the metric of structure, that the effect adds to the tire without it.
+    That is the chi-square, in the metric of what plain tires show, that the effect adds to the tire
+    without it.
     """
     at = PLANS[test.plan].points(test.seed)
     none = Tire(test.seed, float(at["time"].max()), test.truth, 0.0)
-    case = case_of(none.measured(at, 0))
-    base = fit_force(case.problem, case.model.values)
-    structure = structure_rows(case.problem, len(case.problem), base)
-    white = try_force_suspects(case, base, (), structure).counted
-    rows = white(np.concatenate([base.slopes, structure]))
-    inner = np.linalg.inv(rows @ rows.T + np.eye(len(rows)))
+    among = hypotheses_of(case_of(none.measured(at, 0)))
+    null = among.base.null
+    whiten, metric = among.problem.whitener(null.view.own), null.likeliest
     step = 0.05
     for _ in range(2):
-        change = white(replace(none, strength=step).side(at) - none.side(at))
-        project = rows @ change
-        seen = float(change @ change - project @ inner @ project)
+        change = whiten(replace(none, strength=step).side(at) - none.side(at))
+        right = null.view.white @ change
+        seen = float(change @ change - right @ metric.mean(right))
         step = float(np.clip(step * np.sqrt(test.visible / seen), -0.8, 0.8))
     sign = float(np.random.default_rng([test.seed, 24]).choice([-1.0, 1.0]))
     if CATALOGUE[test.truth].low > -0.3 or test.truth in DRIFTS:
@@ -227,9 +226,8 @@ def pairs(*, scattered: bool = False) -> list[Pair]:
     def signatures(plan: str) -> tuple[list[str], FloatArray]:
         at = PLANS[plan].points(REFERENCE)
         case = case_of(Tire(REFERENCE, float(at["time"].max()), DRIFTS[0], 0.0).measured(at, 0))
-        base = fit_force(case.problem, case.model.values)
         wanted = [CATALOGUE[name] for name in PLANTED]
-        problem = ForceProblem(case.problem.bench, "Fy", base.values, wanted, noise=NOISE)
+        problem = ForceProblem(case.problem.bench, "Fy", case.model.values, wanted, noise=NOISE)
         living, count = problem.living, len(problem.names)
         zeros = tuple(np.zeros(effect.components) for effect in living)
         point = Point(problem.start.base, living, zeros)
@@ -253,26 +251,24 @@ def measured(test: PairCase) -> dict[str, Any]:
     """
     tire = tire_of(test)
     case = case_of(tire.measured(PLANS[test.plan].points(test.seed), 1))
-    base = fit_force(case.problem, case.model.values)
-    suspects = [(CATALOGUE[name], np.zeros(1)) for name in sorted((test.truth, test.rival))]
+    among = hypotheses_of(case)
+    suspects = given_suspects(sorted((test.truth, test.rival)), [], CATALOGUE, "Fy")
     axes = force_axes(case)
     declared = {name: ends for name, ends in ENVELOPE.items() if name in axes}
-    envelope = force_envelope(case, **declared)
-    plan = force_next_test(case, base, suspects, envelope)
-    out: dict[str, Any] = {"strength": tire.strength, "before": test.gap(plan.trial)}
+    plan = next_test(among, suspects, force_envelope(case, **declared), model=case.model)
+    out: dict[str, Any] = {"strength": tire.strength, "before": test.told(among)}
     if len(plan.trial.rivals) < 2:
         return out
     for name, k in (("random", test.any_of(len(plan.points))), ("chosen", 0)):
-        after = _with_run(case, envelope, plan.points[k], tire, 0)
-        fitted = fit_force(after.problem, base.values)
-        out[name] = test.gap(_tried(after, fitted, suspects)) | foretold(plan, k)
+        after = _with_run(case, plan.envelope, plan.points[k], tire, 0)
+        among = hypotheses_of(after)
+        out[name] = test.told(among) | foretold(plan, k)
     out["second"] = out["chosen"]
-    if open_still(out["chosen"]["gap"]):
-        more = force_next_test(after, fitted, suspects, force_envelope(after, **declared))
+    if open_still(out["chosen"]):
+        more = next_test(among, suspects, force_envelope(after, **declared), model=case.model)
         if len(more.trial.rivals) == 2:
             both = _with_run(after, more.envelope, more.points[0], tire, 1)
-            again = fit_force(both.problem, fitted.values)
-            out["second"] = test.gap(_tried(both, again, suspects)) | foretold(more, 0)
+            out["second"] = test.told(hypotheses_of(both)) | foretold(more, 0)
     return out
 
 
@@ -280,9 +276,9 @@ def _with_run(
     case: ForceCase, envelope: Envelope, point: FloatArray, tire: Tire, before: int
 ) -> ForceCase:
     """Return a campaign with one run more, after so many further ones."""
-    joint = points_ahead(case, envelope, point[None])
+    bench = bench_ahead(case.problem.bench, case.model, envelope, point[None])
     n, size = len(case.problem), envelope.points
-    at = joint.bench.conditions.take(np.arange(n, n + size))
+    at = bench.conditions.take(np.arange(n, n + size))
     told = {name: getattr(at, name) for name in ("load", "pressure", "slip_angle", "temperature")}
     later = tire.span + (1 + before) * PAUSE + before * PACE * size
     told |= {"time": later + PACE * np.arange(size), "run": np.zeros(size)}
@@ -291,11 +287,7 @@ def _with_run(
     told |= {name: getattr(off, name) for name in ("load", "pressure", "slip_angle")}
     side = tire.measured(told, 3 + 2 * before).Fy
     measured = np.concatenate([case.problem.measured, side])
-    longer = replace(joint, measured=measured)
+    data = replace(bench.points.data, Fy=measured)
+    bench = replace(bench, points=replace(bench.points, data=data))
+    longer = Problem.of(bench, "Fy", NOISE)
     return replace(case, problem=longer, whole=longer)
-
-
-def _tried(case: ForceCase, base: ForceFit, suspects: Sequence[Any]) -> ForceTrial:
-    """Return the rivals on a campaign."""
-    structure = structure_rows(case.problem, len(case.problem), base)
-    return try_force_suspects(case, base, suspects, structure)

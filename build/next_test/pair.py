@@ -10,7 +10,8 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.errors import CalibrationError
-from tirelib.planning.criterion import RESOLVED, NextTest, Trial
+from tirelib.infer.select import Hypotheses
+from tirelib.planning.criterion import NextTest
 
 CACHE = Path(__file__).parents[1] / "out" / "next_test"
 A_PLAN = 3
@@ -45,11 +46,13 @@ class PairCase:
     rival: str
     visible: float
 
-    def gap(self, trial: Trial) -> Mapping[str, Any]:
-        """Return by how much the rival is worse than the truth, and who cannot be fitted."""
-        cost = {rival.name: rival.cost for rival in trial.rivals}
-        gap = cost[self.rival] - cost[self.truth] if len(cost) == 2 else None
-        return {"gap": gap, "left_out": dict(trial.left_out), "size": trial.size}
+    def told(self, among: Hypotheses) -> dict[str, Any]:
+        """Return which of the two is in the confidence set, and by how much the rival is worse."""
+        fits = {name: among.at([name]) for name in (self.truth, self.rival)}
+        inside = {name: fit is not None and fit.p > among.false_alarm for name, fit in fits.items()}
+        truth, rival = fits.values()
+        gap = None if truth is None or rival is None else truth.likelihood - rival.likelihood
+        return {"inside": inside, "gap": None if gap is None else 2.0 * gap}
 
     def any_of(self, count: int) -> int:
         """Return one of so many runs at random: another draw for every case."""
@@ -66,9 +69,9 @@ class PairCase:
             )
 
 
-def open_still(gap: float | None) -> bool:
-    """Return whether a gap rules nobody out."""
-    return gap is None or abs(gap) < RESOLVED
+def open_still(told: Mapping[str, Any]) -> bool:
+    """Return whether both are in the confidence set, or none."""
+    return len(set(told["inside"].values())) == 1
 
 
 def foretold(test: NextTest, rank: int) -> dict[str, Any]:

@@ -44,6 +44,8 @@ _PARTS = (
     "strain",
     "brush",
     "compare",
+    "infer",
+    "problems",
 )
 STAGES = {
     "before": "before",
@@ -83,11 +85,11 @@ def verdict(case: Any, code: str) -> Verdict:
 
 
 def state(found: Verdict, stage: str) -> str:
-    """Return right, wrong or open: whether one of the two is ruled out, and which."""
-    gap = found.get(stage, {}).get("gap")
-    if gap is None or open_still(gap):
+    """Return right, wrong or open: whether one of the two alone is in the set, and which."""
+    told = found.get(stage)
+    if told is None or open_still(told):
         return "open"
-    return "right" if gap > 0.0 else "wrong"
+    return "right" if told["inside"][found["truth"]] else "wrong"
 
 
 def shares(found: Sequence[Verdict], stage: str) -> str:

@@ -146,7 +146,7 @@ def test_the_report_is_one_page_and_the_same_in_words(planned: Any) -> None:
     assert 'src="http' not in page
     for plot in (f"separation-{EFFECT}-temperature", "repeats"):
         assert f'id="plot-{plot}"' in page
-    for text in ("Runs by rank", "widened to both sides: pressure by 15 %", "T-optimum"):
+    for text in ("Runs by rank", "widened to both sides: pressure by 15 %", "W. J. Hill"):
         assert text in page
         assert text in words
 

@@ -51,8 +51,8 @@ Examples:
 Without --diagnosis or --suspects the campaign is diagnosed first (a minute or so). Ranges that are
 not declared are the campaign's own, loads and speeds widened by 25 %, pressures by 15 %. The
 separation is the chi-square that one run is expected to add against the wrong suspect. The chance
-to resolve is that of putting a suspect out of the confidence set of `tirelib diagnose`; for forces,
-of a chi-square of 10. Exit code: 0 done, also when nothing is in doubt; 2 bad input.
+to resolve is that of putting a suspect out of the confidence set of `tirelib diagnose`.
+Exit code: 0 done, also when nothing is in doubt; 2 bad input.
 """
 SHOWN = 8
 RANGES = {
@@ -238,7 +238,7 @@ def _for_force(
     """Return the next test of a force, as a document and as a plan."""
     from tirelib.diagnose.forces.assess import force_case
     from tirelib.planning.document import plan_document, plan_force_test
-    from tirelib.planning.force_rivals import force_envelope
+    from tirelib.planning.force_runs import force_envelope
     from tirelib.planning.suspects import given_suspects, suspects_of
 
     told: dict[str, Any] | None = None
@@ -258,7 +258,15 @@ def _for_force(
             given = [name.strip() for name in str(names).split(",")]
             suspects = given_suspects(given, has, catalogue, case.quantity)
         envelope = force_envelope(case, sweep, **declared) if suspects.effects else None
-        plan = plan_force_test(case, suspects, envelope, wanted=wanted, progress=progress)
+        plan = plan_force_test(
+            case,
+            suspects,
+            envelope,
+            list(catalogue.values()),
+            false_alarm=false_alarm,
+            wanted=wanted,
+            progress=progress,
+        )
     document = plan_document(plan) | {"error": case.given, "error_unit": case.unit}
     if told is not None:
         document |= {"verdict": told["verdict"], "would_revive": told["next_test"]["would_revive"]}

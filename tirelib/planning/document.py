@@ -1,28 +1,31 @@
 """The next test as JSON, and in words."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from tirelib.compare.forces import UNITS
+from tirelib.diagnose.diagnose import FALSE_ALARM
 from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.fit import fit_force
-from tirelib.effects import Effect
+from tirelib.diagnose.forces.models import plain_tires
+from tirelib.effects import CATALOGUE, Effect
 from tirelib.infer.select import Hypotheses
-from tirelib.planning.criterion import ENDLESS, NOTHING, RESOLVED, WANTED, NextTest, PairForecast
+from tirelib.planning.criterion import ENDLESS, NOTHING, WANTED, NextTest, PairForecast
 from tirelib.planning.envelope import AXES, Envelope
-from tirelib.planning.next_test import force_next_test, gains, next_test
-from tirelib.planning.repeats import force_gains
+from tirelib.planning.next_test import gains, next_test
 from tirelib.planning.suspects import Suspects, suspects_of
 from tirelib.problems.strain import StrainProblem
 from tirelib.quantities import QUANTITIES
 
 FORMAT = "tirelib-next-test/1"
 PROMISING = 0.5
-"""Chance of ruling a suspect out below which a run is not advised without a warning."""
+"""Chance of ruling a suspect out below which a run is not advised without a warning, and from which
+a plan that is measured again shows an effect."""
 NONE = "nothing is in doubt: this campaign leaves no effects that have to be told apart"
+STRUCTURE = "what plain tires show in addition to the model"
+"""What hides effects and does not average out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +38,8 @@ class Plan:
     test : NextTest or None
         None where nothing is in doubt.
     gains : mapping
-        What repeating the plan does for weak effects, by times: of strain the chance to show the
-        effect (`tirelib.planning.next_test.gains`), of forces the chi-square against no effect
-        (`tirelib.planning.repeats.force_gains`).
+        Chance that repeating the plan shows weak effects, by times
+        (`tirelib.planning.next_test.gains`).
     wanted : float
         Separation asked for.
     campaign : str
@@ -51,18 +53,6 @@ class Plan:
     wanted: float
     campaign: str
     quantity: str = "strain"
-
-    @property
-    def enough(self) -> float:
-        """Gain from which on the plan shows an effect: a chance, or the chi-square of a force."""
-        return PROMISING if self.quantity == "strain" else RESOLVED
-
-    @property
-    def structure(self) -> str:
-        """What hides effects and does not average out."""
-        if self.quantity == "strain":
-            return "what plain tires show in addition to the model"
-        return "the brush's shape"
 
 
 def plan_test(
@@ -103,11 +93,13 @@ def plan_force_test(
     case: ForceCase,
     suspects: Suspects,
     envelope: Envelope | None,
+    catalogue: Sequence[Effect] = tuple(CATALOGUE.values()),
     *,
+    false_alarm: float = FALSE_ALARM,
     wanted: float = WANTED,
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
-    """Judge further points of a force for suspects.
+    """Judge further runs of a force for suspects: points, or sweeps.
 
     Other parameters, and errors, as in `plan_test`.
 
@@ -115,25 +107,18 @@ def plan_force_test(
     ----------
     case : ForceCase
     envelope : Envelope or None
-        Of `tirelib.planning.force_rivals.force_envelope`; needed if there are suspects.
+        Of `tirelib.planning.force_runs.force_envelope`; needed if there are suspects.
+    catalogue : sequence of Effect
+        What the suspects are held against.
+    false_alarm : float
+        Probability with which a plain tire is said to lack something.
     """
     if not suspects.effects or envelope is None:
         return Plan(suspects, None, {}, wanted, case.name, case.quantity)
-    base = fit_force(
-        case.problem,
-        case.model.values,
-        [*case.effects, *(e for e, _ in suspects.beside)],
-        [*case.strengths, *(strength for _, strength in suspects.beside)],
-    )
-    test = force_next_test(
-        case,
-        base,
-        suspects.effects,
-        envelope,
-        with_nothing=suspects.with_nothing,
-        progress=progress,
-    )
-    again = force_gains(test.trial, test.noise)
+    given = case.as_given(catalogue)
+    hypotheses = Hypotheses(given, plain_tires(case.quantity), false_alarm, progress)
+    test = next_test(hypotheses, suspects, envelope, model=case.model, progress=progress)
+    again = gains(hypotheses, suspects, test)
     return Plan(suspects, test, again, wanted, case.name, case.quantity)
 
 
@@ -210,7 +195,6 @@ def plan_document(plan: Plan) -> dict[str, Any]:
         ],
         "left_out": dict(test.trial.left_out),
         "present": [_present(pair) for pair in test.pairs],
-        **({} if plan.quantity == "strain" else {"resolved_at": RESOLVED}),
         "candidates": candidates,
         "best": candidates[0],
         "random_median": {
@@ -275,7 +259,7 @@ def _repeats(plan: Plan, test: NextTest) -> dict[str, Any]:
         "of_plan": {
             name: {
                 "times": next(
-                    (int(n) for n, x in by.items() if n < ENDLESS and x >= plan.enough), None
+                    (int(n) for n, x in by.items() if n < ENDLESS and x >= PROMISING), None
                 ),
                 "gain_now": by[1],
                 "gain_limit": by[ENDLESS],
@@ -344,7 +328,7 @@ def _advised(plan: Plan, test: NextTest) -> str:
     needed = pair.needed(plan.wanted)
     if needed is None and pair.limit < plan.wanted:
         text += (
-            f"; {plan.structure} limits its separation to {pair.limit:.0f}, repeats do "
+            f"; {STRUCTURE} limits its separation to {pair.limit:.0f}, repeats do "
             "not help: widen the envelope"
         )
     elif needed is not None and needed > 1:
@@ -356,11 +340,11 @@ def _weak(plan: Plan) -> list[str]:
     """Say what repeating the whole plan would do for hints."""
     said = []
     for name, by in plan.gains.items():
-        times = next((int(n) for n, x in by.items() if n < ENDLESS and x >= plan.enough), None)
+        times = next((int(n) for n, x in by.items() if n < ENDLESS and x >= PROMISING), None)
         if times == 1:
             said.append(
                 f"the present plan should show {name} at this strength already "
-                f"({_gain(plan, by[1])}), so repeats of it would add little"
+                f"({_chance(by[1])}), so repeats of it would add little"
             )
         elif times is not None:
             said.append(
@@ -368,14 +352,11 @@ def _weak(plan: Plan) -> list[str]:
             )
         else:
             said.append(
-                f"repeats of the present plan will not show {name}: {plan.structure} limits it to "
-                f"{_gain(plan, by[ENDLESS])}, and {_gain(plan, plan.enough)} is needed"
+                f"repeats of the present plan will not show {name}: {STRUCTURE} limits it to "
+                f"{_chance(by[ENDLESS])}, and {_chance(PROMISING)} is needed"
             )
     return said
 
 
-def _gain(plan: Plan, size: float) -> str:
-    """Say a gain: a chance, or a chi-square."""
-    if plan.quantity == "strain":
-        return f"a chance of {100.0 * size:.0f} %"
-    return f"a chi-square of {size:.0f}"
+def _chance(size: float) -> str:
+    return f"a chance of {100.0 * size:.0f} %"

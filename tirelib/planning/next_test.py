@@ -1,21 +1,16 @@
-"""The next test for strain and for forces: rivals, what they foretell, and the judged runs."""
+"""The next test of strain and of forces: rivals, and possible runs by what they do to them."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.fit import ForceFit
-from tirelib.diagnose.forces.fit import Problem as ForceProblem
-from tirelib.effects import Effect
+from tirelib.compare.force_model import ForceModel
 from tirelib.errors import ParameterError, TirelibError
 from tirelib.infer.hypothesis import Hypothesis
-from tirelib.infer.next_run import next_runs
+from tirelib.infer.next_run import Ahead, next_runs
 from tirelib.infer.problem import Point
 from tirelib.infer.select import Hypotheses
-from tirelib.model.state import Operating
 from tirelib.planning.criterion import (
     ENDLESS,
     NOTHING,
@@ -23,42 +18,68 @@ from tirelib.planning.criterion import (
     NextTest,
     Noise,
     PairForecast,
-    judged,
+    Suspect,
+    Trial,
 )
 from tirelib.planning.envelope import Envelope, operating_at
-from tirelib.planning.force_rivals import (
-    force_forecasts,
-    points_ahead,
-    structure_rows,
-    try_force_suspects,
-)
-from tirelib.planning.repeats import PLAN_REPEATS
+from tirelib.planning.force_runs import bench_ahead
 from tirelib.planning.suspects import Suspects
+from tirelib.problems.forces import ForceProblem
 from tirelib.problems.strain import StrainProblem
 from tirelib.threads import one_thread
 
+PLAN_REPEATS = (1, 2, 3, 4, 6, 8, 12)
+"""Times that the whole plan is measured."""
 MANY = 1e3
 """Repeats that stand for endless ones: the noise is far below the misfit of a run then, and normal
 equations of still less noise are not accurate."""
 
 
-@dataclass(frozen=True, slots=True)
-class Suspect:
-    """A suspect fitted to the present runs, `tirelib.planning.criterion.Rival`."""
+class _Runs:
+    """Possible runs behind the present ones of a problem."""
 
-    name: str
-    cost: float
-    strength: FloatArray
-    in_range: bool
+    def __init__(
+        self, problem: StrainProblem | ForceProblem, envelope: Envelope, model: ForceModel | None
+    ) -> None:
+        self.problem, self.envelope, self.model = problem, envelope, model
 
+    def ahead(self, wanted: FloatArray, repeats: FloatArray) -> Ahead:
+        """Return the problem with runs (n, axes) behind the present ones, each so many times."""
+        if isinstance(self.problem, StrainProblem):
+            points = operating_at(wanted, self.problem.data.points)
+            return self.problem.followed_by(points, repeats)
+        assert self.model is not None  # noqa: S101 - of forces
+        bench = bench_ahead(self.problem.bench, self.model, self.envelope, wanted)
+        return self.problem.followed_by(bench, np.repeat(repeats, self.envelope.points))
 
-@dataclass(frozen=True, slots=True)
-class StrainTrial:
-    """Suspects of strain on the present runs, `tirelib.planning.criterion.Trial`."""
+    def solve(self, point: Point, wanted: FloatArray) -> None:
+        """Raise TirelibError if the model has no solution at one of some runs (n, axes)."""
+        if isinstance(self.problem, StrainProblem):
+            self.problem.model_at(point, operating_at(wanted, self.problem.data.points))
+        else:
+            self.ahead(wanted, np.ones(len(wanted))).solve(point)
 
-    rivals: tuple[Suspect, ...]
-    left_out: dict[str, str]
-    size: float
+    def possible(self, rivals: list[Hypothesis], wanted: FloatArray) -> BoolArray:
+        """Return at which runs every rival has a solution (tread not pressed through and so on)."""
+        good = np.ones(len(wanted), dtype=bool)
+        for point in (self.problem.start, *(rival.fit.point for rival in rivals)):
+            if good.any():
+                good[self._impossible(point, wanted, np.flatnonzero(good))] = False
+        return good
+
+    def _impossible(self, point: Point, wanted: FloatArray, index: IntArray) -> list[int]:
+        """Return runs without a solution, by halving what fails."""
+        try:
+            self.solve(point, wanted[index])
+        except TirelibError:
+            if len(index) == 1:
+                return [int(index[0])]
+            half = len(index) // 2
+            return [
+                *self._impossible(point, wanted, index[:half]),
+                *self._impossible(point, wanted, index[half:]),
+            ]
+        return []
 
 
 @one_thread()
@@ -67,16 +88,20 @@ def next_test(
     suspects: Suspects,
     envelope: Envelope,
     *,
+    model: ForceModel | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> NextTest:
-    """Judge the runs of an envelope by how well they part suspects of strain.
+    """Judge the runs of an envelope by how well they part suspects.
 
     Parameters
     ----------
     hypotheses : Hypotheses
-        About the present runs (a `StrainProblem`).
+        About the present runs (a `StrainProblem` or a `ForceProblem`).
     suspects : Suspects
     envelope : Envelope
+        Of forces that of `tirelib.planning.force_runs.force_envelope`.
+    model : ForceModel, optional
+        The brush, of forces.
     progress : callable, optional
 
     Raises
@@ -85,10 +110,9 @@ def next_test(
         If no run in the envelope has a solution.
     """
     tell = progress or (lambda label: None)
-    problem = hypotheses.problem
-    assert isinstance(problem, StrainProblem)  # noqa: S101 - forces have their own
+    problem = _problem(hypotheses)
     rivals, left_out = _fitted(hypotheses, suspects)
-    trial = StrainTrial(
+    trial = Trial(
         tuple(_suspect(name, rival, hypotheses) for name, rival in rivals.items()),
         left_out,
         hypotheses.base.null.size.whole,
@@ -96,17 +120,19 @@ def next_test(
     noise = Noise(float(np.mean(problem.noise)), problem.own_misfit(hypotheses.own))
     chosen = envelope.grid()
     if len(rivals) < 2:
-        return _without(envelope, trial, noise)
-    ahead = operating_at(chosen, problem.data.points)
-    good = _possible(problem, tuple(rivals.values()), ahead)
+        empty, none = np.zeros(0), np.zeros((0, len(envelope.names)))
+        return NextTest(envelope, none, empty, empty, empty, (), (), trial, 0, noise)
+    fits, runs = list(rivals.values()), _Runs(problem, envelope, model)
+    good = runs.possible(fits, chosen)
     if not good.any():
-        raise _hopeless(len(chosen))
+        raise ParameterError(
+            f"envelope: the model has no solution at any of its {len(chosen)} runs (tread pressed "
+            "through, or too large a patch); lower the loads of --load-range"
+        )
     points = chosen[good]
     tell(f"{len(points)} runs with {' and '.join(rivals)}")
     alpha = hypotheses.false_alarm
-    parted = next_runs(
-        problem.followed_by(ahead.take(good), np.ones(len(points))), tuple(rivals.values()), alpha
-    )
+    parted = next_runs(runs.ahead(points, np.ones(len(points))), fits, alpha)
     open_ = [pair for pair in parted if not pair.resolved] or parted
     size = np.array([pair.separation for pair in open_])
     chance = np.mean([pair.chance for pair in open_], axis=0)
@@ -114,11 +140,9 @@ def next_test(
     score = np.min(size, axis=0)
     std = np.array([open_[pair].std[run] for run, pair in enumerate(hardest)])
     order = np.lexsort((-score, -np.round(chance, 3)))
-    best = operating_at(np.repeat(points[order[:1]], len(REPEATS) + 1, axis=0), problem.data.points)
     tell("repeats of the best run")
-    again = next_runs(
-        problem.followed_by(best, np.array([*REPEATS, ENDLESS])), tuple(rivals.values()), alpha
-    )
+    best = np.repeat(points[order[:1]], len(REPEATS) + 1, axis=0)
+    again = next_runs(runs.ahead(best, np.array([*REPEATS, ENDLESS])), fits, alpha)
     names = list(rivals)
     pairs = tuple(
         PairForecast(
@@ -145,6 +169,12 @@ def next_test(
         len(chosen) - len(points),
         noise,
     )
+
+
+def _problem(hypotheses: Hypotheses) -> StrainProblem | ForceProblem:
+    problem = hypotheses.problem
+    assert isinstance(problem, StrainProblem | ForceProblem)  # noqa: S101 - there are no others
+    return problem
 
 
 def _fitted(
@@ -174,38 +204,6 @@ def _suspect(name: str, rival: Hypothesis, hypotheses: Hypotheses) -> Suspect:
     return Suspect(name, cost, strength, rival.plausible)
 
 
-def _possible(problem: StrainProblem, rivals: Sequence[Hypothesis], ahead: Operating) -> BoolArray:
-    """Return at which points every rival has a solution (tread not pressed through and so on)."""
-    good = np.ones(len(ahead), dtype=bool)
-    for point in (problem.start, *(rival.fit.point for rival in rivals)):
-        if good.any():
-            good[_impossible(problem, point, ahead, np.flatnonzero(good))] = False
-    return good
-
-
-def _impossible(
-    problem: StrainProblem, point: Point, ahead: Operating, index: IntArray
-) -> list[int]:
-    """Return points without a solution, by halving what fails."""
-    try:
-        problem.model_at(point, ahead.take(index))
-    except TirelibError:
-        if len(index) == 1:
-            return [int(index[0])]
-        half = len(index) // 2
-        return [
-            *_impossible(problem, point, ahead, index[:half]),
-            *_impossible(problem, point, ahead, index[half:]),
-        ]
-    return []
-
-
-def _without(envelope: Envelope, trial: StrainTrial, noise: Noise) -> NextTest:
-    """Return a plan without runs, where there are not two suspects."""
-    empty, none = np.zeros(0), np.zeros((0, len(envelope.names)))
-    return NextTest(envelope, none, empty, empty, empty, (), (), trial, 0, noise)
-
-
 def gains(
     hypotheses: Hypotheses, suspects: Suspects, test: NextTest
 ) -> dict[str, dict[float, float]]:
@@ -215,8 +213,7 @@ def gains(
     Noise and set points average, the misfit that a run has for itself does not. Empty unless that
     nothing is missing is a rival.
     """
-    problem = hypotheses.problem
-    assert isinstance(problem, StrainProblem)  # noqa: S101 - forces have their own
+    problem = _problem(hypotheses)
     nothing = hypotheses.at([effect.name for effect, _ in suspects.beside])
     if not suspects.with_nothing or nothing is None:
         return {}
@@ -233,71 +230,3 @@ def gains(
                 ranges = float(np.linalg.norm(rival.strength)) / effect.scale
                 out[rival.name][times] = null.power(rival.name, ranges, limit)
     return out
-
-
-def _hopeless(count: int) -> ParameterError:
-    return ParameterError(
-        f"envelope: the model has no solution at any of its {count} runs (tread pressed through, "
-        "or too large a patch); lower the loads of --load-range"
-    )
-
-
-def force_next_test(
-    case: ForceCase,
-    base: ForceFit,
-    suspects: Sequence[tuple[Effect, FloatArray]],
-    envelope: Envelope,
-    *,
-    with_nothing: bool = False,
-    progress: Callable[[str], None] | None = None,
-) -> NextTest:
-    """Judge further runs of a force by how well they part suspects: points, or sweeps.
-
-    Parameters
-    ----------
-    case : ForceCase
-        The present points.
-    base : ForceFit
-        The model without the suspects, fitted.
-    suspects : sequence of (effect, start strength)
-    envelope : Envelope
-        Of `tirelib.planning.force_rivals.force_envelope`.
-    with_nothing : bool
-        Whether that nothing is missing is a rival too.
-    progress : callable, optional
-
-    Raises
-    ------
-    ParameterError
-        If no point in the envelope has a solution.
-    """
-    tell = progress or (lambda label: None)
-    chosen, n, size = envelope.grid(), len(case.problem), envelope.points
-    joint = points_ahead(case, envelope, chosen)
-    good = _solvable(joint, base, n).reshape(-1, size).all(axis=1)
-    if not good.any():
-        raise _hopeless(len(chosen))
-    points = chosen[good]
-    joint = points_ahead(case, envelope, points)
-    structure = structure_rows(joint, n, base)
-    trial = try_force_suspects(
-        case, base, suspects, structure[:, :n], with_nothing=with_nothing, progress=progress
-    )
-    tell(f"{len(points)} runs")
-    ahead = joint.take(np.arange(n, len(joint)))
-    told = force_forecasts(trial, ahead, structure[:, n:], size)
-    return judged(envelope, points, trial, told, len(chosen) - len(points), trial.noise)
-
-
-def _solvable(joint: ForceProblem, base: ForceFit, present: int) -> BoolArray:
-    """Return at which points ahead the base brush has a solution."""
-    good = np.ones(len(joint) - present, dtype=bool)
-    try:
-        joint.predict(base.values, base.changes)
-    except TirelibError:
-        for k in range(good.size):
-            try:
-                joint.take(np.array([present + k])).predict(base.values, base.changes)
-            except TirelibError:
-                good[k] = False
-    return good

@@ -5,11 +5,12 @@ which `tirelib.identify` judges them (`SPECS`). Rows are forces at points.
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.arrays import FloatArray, IntArray
 from tirelib.effects import Effect
 from tirelib.errors import TirelibError
 from tirelib.identify.brush_law import SPECS
@@ -132,13 +133,15 @@ class ForceProblem:
         self.ends = -np.full(len(self.names), np.inf), np.full(len(self.names), np.inf)
         self.size = float(np.sqrt(np.mean(self.measured**2))) * load / np.sqrt(np.mean(load**2))
         self.noise_known = bool(np.isfinite(noise))
-        self.noise = noise if self.noise_known else UNKNOWN_NOISE * float(np.mean(self.size))
+        noise = noise if self.noise_known else UNKNOWN_NOISE * float(np.mean(self.size))
+        self.noise = np.full(load.size, noise)
+        self.present = load.size  # points that are measured: the first ones
         self.dead: dict[str, str] = {}
         self._whiteners: dict[float, PointWhitener] = {}
         solved = self.solve(self.start)
         self.slip = slip_of(solved.state, quantity)
         self._tangent = self._by_set_points(solved)
-        self._base = np.linalg.qr((self.slopes(Point(self.start.base), solved) / self.size).T)[0]
+        self._base, self._triangle = np.linalg.qr(self._by_base(solved))
         self.living = self._alive(catalogue, solved)
 
     def whitener(self, own: float) -> PointWhitener:
@@ -152,6 +155,57 @@ class ForceProblem:
                 noise=self.noise,
             )
         return self._whiteners[own]
+
+    def followed_by(self, bench: ForceBench, repeats: FloatArray) -> "ForceProblem":
+        """Return the problem with points ahead, whose force is zero, behind the present ones.
+
+        Parameters
+        ----------
+        bench : ForceBench
+            Of the present points and those ahead.
+        repeats : shape (n_ahead,)
+            Measurements of which each is the mean: noise and set points average, the misfit that a
+            block has for itself does not.
+
+        Raises
+        ------
+        TirelibError
+            If the model has no solution at one of them.
+        """
+        out, n = copy(self), len(repeats)
+        out.bench, out._whiteners = bench, {}
+        out.measured = np.concatenate([self.measured, np.zeros(n)])
+        load = bench.conditions.load
+        out.size = self.size[0] * load / load[0]
+        solved = out.solve(self.start)
+        out.slip = slip_of(solved.state, self.quantity)
+        share = 1.0 / np.sqrt(repeats)
+        out.noise = np.concatenate([self.noise, np.mean(self.noise) * share])
+        out._tangent = out._by_set_points(solved)
+        out._tangent[self.present :] *= share[:, None]
+        out._base = np.linalg.solve(self._triangle.T, out._by_base(solved).T).T
+        return out
+
+    @property
+    def run_ahead(self) -> IntArray:
+        """The run ahead that each point is of, -1 for the present ones."""
+        block = self.bench.points.data.block
+        return np.asarray(np.maximum(block - block[: self.present].max() - 1, -1))
+
+    def own_misfit(self, own: float) -> float:
+        """Return the standard deviation of a block's own misfit, as a mean, [N] or [N m]."""
+        return OWN * own * float(np.mean(self.size[: self.present]))
+
+    def repeated(self, times: float) -> "ForceProblem":
+        """Return the problem of the same points, each the mean of so many measurements."""
+        out = copy(self)
+        out.noise, out._tangent = self.noise / np.sqrt(times), self._tangent / np.sqrt(times)
+        out._whiteners = {}
+        return out
+
+    def _by_base(self, solved: ForceSolved) -> FloatArray:
+        """Return slopes by the base over the size of the force, (n, n_base)."""
+        return np.asarray((self.slopes(Point(self.start.base), solved) / self.size).T)
 
     def constants(self, point: Point) -> dict[str, float]:
         """Return the brush's constants at a point."""
@@ -208,7 +262,8 @@ class ForceProblem:
         """Return smooth shapes over the slip, by how they go with the conditions of a point."""
         shapes = self._shapes() * self.size
         # what the base can mimic is the base's
-        shapes = shapes - (shapes / self.size @ self._base) @ self._base.T * self.size
+        measured = shapes[:, : self.present] / self.size[: self.present]
+        shapes = shapes - (measured @ self._base[: self.present]) @ self._base.T * self.size
         groups = {"constant, slip": CONSTANT * shapes}
         for name, factor in self._factors().items():
             groups[f"{name}, slip"] = shapes * factor
@@ -224,21 +279,22 @@ class ForceProblem:
         all of the effects do together, for an effect may be small because the base or another one
         has done most of what its condition does.
         """
-        factors = self._factors()
+        factors, present = self._factors(), slice(self.present)
         first, done = len(point.base), []
         for size in point.ranges[:count]:
             done.append(size @ slopes[first : first + len(size)])
             first += len(size)
-        whole = float(np.sqrt(sum(np.mean(each**2) for each in done)))
+        whole = float(np.sqrt(sum(np.mean(each[present] ** 2) for each in done)))
         slips, out = self._shapes() * self.size, []
         for effect, each in zip(point.effects, done, strict=False):
             one = np.ones_like(self.size)
             own = [factors[name] for name in effect.varies_with if name in factors] or [one]
             pairs = [f * g for f in own for g in (one, *factors.values())]
             parts = [slips * pair for pair in pairs]
-            sizes = [np.sqrt(len(pairs) * np.mean(np.sum(part**2, axis=0))) for part in parts]
+            squares = [np.mean(np.sum(part[:, present] ** 2, axis=0)) for part in parts]
+            sizes = [np.sqrt(len(pairs) * square) for square in squares]
             smooth = [whole / size * part for part, size in zip(parts, sizes, strict=True)]
-            otherwise = [each * (f - float(np.mean(f))) for f in factors.values()]
+            otherwise = [each * (f - float(np.mean(f[present]))) for f in factors.values()]
             out.append(np.concatenate([*smooth, np.array(otherwise)]))
         return out
 
@@ -247,8 +303,8 @@ class ForceProblem:
 
     def _factors(self) -> dict[str, FloatArray]:
         """Return how a misfit may go with each condition that varies, about one at the ends."""
-        at = self.bench.conditions
-        middle = {name: float(np.median(np.abs(getattr(at, name)))) for name in SPANS}
+        at, measured = self.bench.conditions, self.bench.conditions.take(np.arange(self.present))
+        middle = {name: float(np.median(np.abs(getattr(measured, name)))) for name in SPANS}
         every = {
             "load": np.log(at.load / middle["load"]),
             "pressure": 4.0 * (at.pressure / middle["pressure"] - 1.0),
@@ -257,7 +313,11 @@ class ForceProblem:
             "speed": np.log(np.abs(at.speed) / middle["speed"]) if middle["speed"] else at.speed,
         }
         # a tire that rolls both ways at one speed has a speed that varies, and nothing goes with it
-        found = {name: f for name, f in every.items() if varies(at, name) and np.ptp(f) > 0.0}
+        found = {
+            name: f
+            for name, f in every.items()
+            if varies(measured, name) and np.ptp(f[: self.present]) > 0.0
+        }
         return found | {"order": 2.0 * at.order - 1.0}
 
     def _by_set_points(self, solved: ForceSolved) -> FloatArray:

@@ -40,7 +40,7 @@ class PointWhitener:
         place: FloatArray,
         amount: FloatArray,
         *,
-        noise: float,
+        noise: FloatArray,
     ) -> "PointWhitener":
         """Return the whitening.
 
@@ -53,7 +53,7 @@ class PointWhitener:
             Where over the slip a point stands.
         amount : shape (n,), [N] or [N m]
             Standard deviation of a block's own misfit.
-        noise : float, [N] or [N m]
+        noise : shape (n,), [N] or [N m]
         """
         order = np.argsort(block, kind="stable")
         cuts = np.flatnonzero(np.diff(block[order])) + 1
@@ -61,7 +61,7 @@ class PointWhitener:
         for index in np.split(order, cuts):
             near = np.sqrt(3.0) * np.abs(place[index][:, None] - place[index]) / LENGTH
             own = np.outer(amount[index], amount[index]) * (1.0 + near) * np.exp(-near)
-            inside = noise**2 * np.eye(index.size) + tangent[index] @ tangent[index].T + own
+            inside = np.diag(noise[index] ** 2) + tangent[index] @ tangent[index].T + own
             lower = np.asarray(np.linalg.cholesky(inside))
             volume -= float(np.sum(np.log(np.diag(lower))))
             parts.append((index, lower, np.asarray(np.linalg.inv(lower))))

@@ -7,8 +7,8 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from tirelib.arrays import FloatArray
-from tirelib.planning.criterion import NOTHING, RESOLVED, NextTest, PairForecast
-from tirelib.planning.document import Plan, advice, plan_document
+from tirelib.planning.criterion import NOTHING, NextTest, PairForecast
+from tirelib.planning.document import PROMISING, STRUCTURE, Plan, advice, plan_document
 from tirelib.planning.envelope import AXES
 from tirelib.quantities import QUANTITIES
 from tirelib.report.figures.compare_plot import Plot, styled_figure
@@ -18,17 +18,17 @@ from tirelib.report.style import BLUE, FAINT, RED
 
 TITLE = "Which run to measure next"
 METHOD = (
-    "Every suspect is fitted to the present runs, with what plain tires show beside a model as "
-    "further unknowns. At each possible run one suspect is assumed to be true, with the "
-    "uncertainty that the present runs leave, and the other is adapted within its own "
-    "uncertainty. The chi-square that the other still misses is the separation; the smaller of "
-    f"both directions counts. A chi-square of {RESOLVED:.0f} between two suspects rules the worse "
-    "one out."
+    "Every suspect is fitted to the present runs, as a hypothesis of the diagnosis. At each "
+    "possible run one suspect is assumed to be true: measurements are drawn from what the present "
+    "runs leave open of it, with noise, errors of the set points, and the misfit that a run has "
+    "for itself. The share of draws in which the other suspect leaves the confidence set is the "
+    "chance that the run resolves the pair, over the odds that the present runs give to either. "
+    "The separation is the mean rise of the likelihood ratio against the wrong one, in chi-square; "
+    "the smaller of both directions counts."
 )
 SOURCES = (
-    "Criterion: A. C. Atkinson, V. V. Fedorov, Biometrika 62 (1975) 57: T-optimum designs for "
-    "discriminating between two rival models; here with the parameters' uncertainty integrated out "
-    "as in G. E. P. Box, W. J. Hill, Technometrics 9 (1967) 57.",
+    "Criterion: G. E. P. Box, W. J. Hill, Technometrics 9 (1967) 57: discrimination among models; "
+    "here with the test of the diagnosis in the place of an entropy.",
 )
 SHOWN = 20
 
@@ -343,7 +343,7 @@ def _repeats(plan: Plan, test: NextTest, pairs: tuple[PairForecast, ...]) -> Plo
     return Plot(
         "repeats",
         "What repeats of the advised run add",
-        f"Dotted: the limit that no number of repeats exceeds, because {plan.structure} does not "
+        f"Dotted: the limit that no number of repeats exceeds, because {STRUCTURE} does not "
         "average out.",
         figure,
         ["pair", "repeats", "separation"],
@@ -361,11 +361,11 @@ def _repeat_tables(plan: Plan, test: NextTest) -> list[Table]:
             of_plan.items(),
             {
                 "effect": lambda item: item[0],
-                "chi-square of the effect against no effect, now": lambda item: number(
-                    item[1]["gain_now"], 3
+                "chance to show it, now [%]": lambda item: number(100.0 * item[1]["gain_now"], 2),
+                "the same, infinitely many repeats [%]": lambda item: number(
+                    100.0 * item[1]["gain_limit"], 2
                 ),
-                "the same, infinitely many repeats": lambda item: number(item[1]["gain_limit"], 3),
-                f"repeats of the plan until {RESOLVED:.0f}": lambda item: str(
+                f"repeats of the plan until {100 * PROMISING:.0f} %": lambda item: str(
                     item[1]["times"] or "never"
                 ),
             },

@@ -6,27 +6,23 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.unit.force_points import VALUES
 from tests.unit.planning.drifting import NOISE, PRESSURES, case, side_force
 from tirelib.diagnose.forces.assess import ForceAssessment, ForceCase, assess_forces
 from tirelib.diagnose.forces.document import force_diagnosis_document
-from tirelib.diagnose.forces.fit import fit_force
+from tirelib.diagnose.forces.models import plain_tires
 from tirelib.effects import CATALOGUE
 from tirelib.errors import ParameterError
-from tirelib.planning.criterion import NextTest
+from tirelib.infer.select import Hypotheses
+from tirelib.planning.criterion import NOTHING, NextTest
 from tirelib.planning.document import plan_document, plan_force_test
 from tirelib.planning.envelope import Envelope
-from tirelib.planning.force_rivals import (
-    force_axes,
-    points_ahead,
-    structure_rows,
-    try_force_suspects,
-)
+from tirelib.planning.force_runs import bench_ahead, force_axes
 from tirelib.planning.suspects import given_suspects, suspects_of
 
 PAIR = ["friction_pressure", "friction_drift"]
 BRUSH = [effect for effect in CATALOGUE.values() if effect.hook == "brush"]
-WEAK = ("pressure", 0.1)
+WEAK = ("pressure", 0.06)
+"""So little that these points leave both of the pair in the confidence set."""
 
 
 @cache
@@ -99,21 +95,53 @@ def test_the_advised_point_is_the_first_pressure_once_more_at_the_end() -> None:
     assert test.dropped == 0
 
 
-def test_the_advised_point_rules_the_wrong_one_out() -> None:
+def test_the_advised_point_leaves_the_planted_effect_alone_in_the_set() -> None:
     made, test = case(*WEAK), planned()
-    joint = points_ahead(made, test.envelope, np.repeat(test.points[:1], 4, axis=0))
-    n = len(made.problem)
-    at = joint.bench.conditions.take(np.arange(n, n + 4))
+    n, times = len(made.problem), 8
+    again = np.repeat(test.points[:1], times, axis=0)
+    bench = bench_ahead(made.problem.bench, made.model, test.envelope, again)
+    at = bench.conditions.take(np.arange(n, n + times))
     assert (at.order == 1.0).all()
     side = side_force(WEAK, at.load, at.pressure, at.slip_angle, at.order)
-    side = side + NOISE * np.random.default_rng(8).standard_normal(4)
-    measured = np.concatenate([made.problem.measured, side])
-    after = replace(made, problem=replace(joint, measured=measured))
-    base = fit_force(after.problem, VALUES)
-    structure = structure_rows(after.problem, n + 4, base)
-    suspects = [(CATALOGUE[name], np.zeros(1)) for name in PAIR]
-    pressure, drift = try_force_suspects(after, base, suspects, structure).rivals
-    assert drift.cost - pressure.cost > max(10.0, test.pairs[0].gap)
+    side = side + NOISE * np.random.default_rng(8).standard_normal(times)
+    data = replace(bench.points.data, Fy=np.concatenate([made.problem.measured, side]))
+    bench = replace(bench, points=replace(bench.points, data=data))
+    after = replace(made, problem=replace(made.problem, bench=bench))
+    inside = {}
+    for when, each in (("before", made), ("after", after)):
+        among = Hypotheses(each.as_given(BRUSH), plain_tires("Fy"))
+        inside[when] = {
+            name: fit is not None and fit.p > among.false_alarm
+            for name in PAIR
+            for fit in [among.at([name])]
+        }
+    assert inside["before"] == dict.fromkeys(PAIR, True)
+    assert inside["after"] == {PAIR[0]: True, PAIR[1]: False}
+
+
+def test_points_ahead_are_seen_with_the_coefficients_of_the_present_ones() -> None:
+    """What may explain a residual ahead goes on as it does in the present points."""
+    made, test = case(*WEAK), planned()
+    problem = made.as_given(BRUSH)
+    bench = bench_ahead(made.problem.bench, made.model, test.envelope, test.points[:5])
+    ahead, n = problem.followed_by(bench, np.ones(5)), len(made.problem)
+    assert ahead.run_ahead.tolist() == [-1] * n + list(range(5))
+    here, there = problem.solve(problem.start), ahead.solve(problem.start)
+    assert there.rest[:n] == pytest.approx(here.rest)
+    assert there.rest[n:] == pytest.approx(-there.force[n:])
+    for name, rows in problem.remainder(problem.start, here).items():
+        found = ahead.remainder(problem.start, there)[name][:, :n]
+        assert found == pytest.approx(rows, abs=1e-4 * np.abs(rows).max())
+    # the same points once more behind themselves: every row is repeated
+    joint = made.problem.bench.take(np.tile(np.arange(n), 2))
+    block = np.concatenate([np.arange(n), n + np.arange(n)])
+    points = replace(joint.points, data=replace(joint.points.data, block=block))
+    twice = problem.followed_by(replace(joint, points=points), np.ones(n))
+    solved = twice.solve(problem.start)
+    for rows in twice.remainder(problem.start, solved).values():
+        assert rows[:, n:] == pytest.approx(rows[:, :n], abs=1e-9 * np.abs(rows).max())
+    white = twice.whitener(0.001)(solved.force[None])[0]
+    assert white[n:] == pytest.approx(white[:n])
 
 
 def test_a_point_ahead_is_told_in_engineers_units_and_repeats_add() -> None:
@@ -130,6 +158,17 @@ def test_a_point_ahead_is_told_in_engineers_units_and_repeats_add() -> None:
     reached = list(test.pairs[0].repeats.values())
     assert reached == sorted(reached)
     assert reached[-1] <= test.pairs[0].limit
+
+
+def test_the_whole_plan_again_shows_an_effect_more_likely() -> None:
+    made = case(*WEAK)
+    alone = given_suspects(PAIR[:1], [], CATALOGUE, "Fy")
+    plan = plan_force_test(made, alone, envelope(made))
+    assert plan.test is not None
+    assert [rival.name for rival in plan.test.trial.rivals] == [PAIR[0], NOTHING]
+    chances = list(plan.gains[PAIR[0]].values())
+    assert (np.diff(chances) >= -1e-9).all()
+    assert 0.0 < chances[0] < chances[-1] <= 1.0
 
 
 def test_what_a_force_cannot_have_is_refused() -> None:

@@ -6,24 +6,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.unit.force_points import VALUES
 from tests.unit.planning.drifting import PRESSURES, case
 from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.fit import fit_force
 from tirelib.effects import CATALOGUE
 from tirelib.errors import ParameterError
 from tirelib.identify.force_points import force_points
-from tirelib.planning.criterion import Noise
 from tirelib.planning.document import Plan, plan_document, plan_force_test
 from tirelib.planning.envelope import Envelope
-from tirelib.planning.force_noise import counted_noise
-from tirelib.planning.force_rivals import (
-    force_envelope,
-    force_forecasts,
-    points_ahead,
-    structure_rows,
-    try_force_suspects,
-)
+from tirelib.planning.force_runs import bench_ahead, force_envelope
 from tirelib.planning.suspects import given_suspects
 from tirelib.planning.sweep import campaign_sweep
 from tirelib.report.next_test import parts_of, write_next_test
@@ -108,41 +98,36 @@ def test_the_points_of_a_sweep_are_one_block_and_follow_the_campaign() -> None:
     made = case("pressure", 0.03)
     envelope = force_envelope(made, **DECLARED)
     wanted = envelope.grid()[:3]
-    joint, n = points_ahead(made, envelope, wanted), len(made.problem)
-    assert len(joint) == n + 3 * 6
-    ahead = joint.take(np.arange(n, len(joint)))
-    assert ahead.bench.conditions.slip_angle.reshape(3, 6) == pytest.approx(
+    present, n = made.problem.bench, len(made.problem)
+    bench = bench_ahead(present, made.model, envelope, wanted)
+    assert len(bench.points) == n + 3 * 6
+    ahead = bench.take(np.arange(n, n + 18))
+    assert ahead.conditions.slip_angle.reshape(3, 6) == pytest.approx(
         np.tile(ANGLES, (3, 1)), abs=1e-3
     )
-    assert ahead.bench.conditions.load == pytest.approx(np.repeat(wanted[:, 0], 6))
-    assert ahead.block.tolist() == np.repeat(ahead.block[::6], 6).tolist()
-    assert np.unique(ahead.block).size == 3
-    assert ahead.block.min() > made.problem.block.max()
+    assert ahead.conditions.load == pytest.approx(np.repeat(wanted[:, 0], 6))
+    block = ahead.points.data.block
+    assert block.tolist() == np.repeat(block[::6], 6).tolist()
+    assert np.unique(block).size == 3
+    assert block.min() > present.points.data.block.max()
 
 
 def test_set_points_that_are_off_alike_cost_a_sweep_more_than_independent_ones() -> None:
+    """A load that is off shifts the force of all points alike, in proportion."""
     made = case("pressure", 0.03)
     envelope, n = force_envelope(made, **DECLARED), len(made.problem)
-    base = fit_force(made.problem, VALUES)
-    joint = points_ahead(made, envelope, envelope.grid()[:2])
-    structure = structure_rows(joint, n, base)
-    trial = try_force_suspects(made, base, [(CATALOGUE[PAIR[0]], np.zeros(1))], structure[:, :n])
-    trial = replace(trial, counted=replace(trial.counted, share=2.0))
-    ahead = joint.take(np.arange(n, len(joint)))
-    (together,) = force_forecasts(trial, ahead, structure[:, n:], 6)
-    (alone,) = force_forecasts(trial, ahead, structure[:, n:], 1)
-    assert together.wave.shape == (2, 6)
-    assert together.wave.ravel() == pytest.approx(alone.wave.ravel())
-    # a load that is off shifts the force of all points alike, in proportion
-    load = together.tangents[0, :, 0]
-    like_load, quiet = together.wave + load, Noise(1.0, 0.0)
-    still = replace(together, covariance=1e-12 * together.covariance)
-    each = replace(alone, covariance=still.covariance)
-    shared = still.missed(replace(still, wave=like_load), quiet, 1.0)[0][0]
-    one_by_one = replace(each, wave=like_load.reshape(-1, 1))
-    apart = each.missed(one_by_one, quiet, 1.0)[0][:6].sum()
-    assert shared == pytest.approx(load @ load / (1.0 + load @ load), rel=0.05)
-    assert shared < apart
+    bench = bench_ahead(made.problem.bench, made.model, envelope, envelope.grid()[:1])
+    data = bench.points.data
+    single = np.concatenate([data.block[:n], data.block[n] + np.arange(6)])
+    apart = replace(bench, points=replace(bench.points, data=replace(data, block=single)))
+    problem, more = made.as_given(list(CATALOGUE.values())), np.ones(6)
+    sizes = {}
+    for name, each in (("together", bench), ("apart", apart)):
+        ahead = problem.followed_by(each, more)
+        like_load = ahead.solve(problem.start).force.copy()
+        like_load[:n] = 0.0
+        sizes[name] = float(np.sum(ahead.whitener(0.0)(like_load[None]) ** 2))
+    assert sizes["together"] < 0.5 * sizes["apart"]
 
 
 def test_a_sweep_adds_more_than_its_best_point_and_is_told_so() -> None:
@@ -161,16 +146,6 @@ def test_a_sweep_adds_more_than_its_best_point_and_is_told_so() -> None:
     assert document["envelope"]["points_of_run"] == 6
     said = plan.test.envelope.text(plan.test.points[0])
     assert said.endswith("a sweep of 6 slip angles from -8.0 to 8.0 deg")
-
-
-def test_what_suspects_do_is_no_noise() -> None:
-    made = case("pressure", 0.35)
-    base = fit_force(made.problem, VALUES)
-    none = np.zeros((0, len(made.problem)))
-    _, alone = counted_noise(made, base, none)
-    suspects = [(CATALOGUE[name], np.zeros(1)) for name in PAIR]
-    trial = try_force_suspects(made, base, suspects, none)
-    assert trial.counted.excess < 0.5 * alone.excess
 
 
 def test_the_page_of_sweeps_tells_their_slips(tmp_path: object) -> None:

@@ -20,7 +20,7 @@ from tirelib.identify.force_data import force_data
 from tirelib.identify.force_noise import force_noise
 from tirelib.identify.force_points import ForcePoints, force_points
 from tirelib.parameters import TireFile
-from tirelib.problems.forces import varies
+from tirelib.problems.forces import ForceProblem, varies
 
 MOST_POINTS = 4000
 """Points that are fitted; of a longer sweep passes are left out evenly."""
@@ -104,6 +104,18 @@ class ForceCase:
     def strengths(self) -> list[np.ndarray]:
         """Their strengths, arrays of components."""
         return [used.components for used in self.model.used]
+
+    def as_given(self, catalogue: Sequence[Effect]) -> ForceProblem:
+        """Return the force as the inference sees it, about the model as its file has it."""
+        return ForceProblem(
+            self.problem.bench,
+            self.quantity,
+            self.model.values,
+            catalogue,
+            noise=self.noise,
+            effects=self.effects,
+            strengths=self.strengths,
+        )
 
 
 def force_case(

@@ -240,22 +240,6 @@ def with_effect(problem: Problem, model: ForceFit, effect: Effect) -> ForceFit:
     return best
 
 
-def slopes_at(problem: Problem, model: ForceFit) -> FloatArray:
-    """Return a fitted brush's slopes at the points of another problem, as `ForceFit.slopes`."""
-    scale = [effect.scale for effect in model.effects for _ in range(effect.components)]
-    here = problem.predict(model.values, model.changes)
-    rows = []
-    for k in range(len(model.names) + len(scale)):
-        step = np.zeros(len(model.names) + len(scale))
-        step[k] = STEP
-        values = moved_constants(model.values, model.names, step[: len(model.names)])
-        flat = np.concatenate([*model.strengths, []]) + step[len(model.names) :] * scale
-        cuts = np.cumsum([effect.components for effect in model.effects])[:-1]
-        strengths = np.split(flat, cuts) if model.effects else []
-        rows.append((problem.predict(values, changes_at(model.effects, strengths)) - here) / STEP)
-    return np.stack(rows)
-
-
 def _covariance(rows: FloatArray, rest: FloatArray, block: IntArray) -> FloatArray:
     """Return the covariance of the parameters, with errors that go together within a block."""
     p = len(rows)
