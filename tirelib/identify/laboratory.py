@@ -22,6 +22,9 @@ STEP = 1e-5
 LEAST_STIFFNESS = 0.05
 """Share of the stiffness at the tire's pressure, below which no test is proposed at another one."""
 
+Measure = Callable[[Tire], Sequence[float] | FloatArray]
+"""What a test measures of a tire."""
+
 
 @dataclass(frozen=True, slots=True)
 class Test:
@@ -64,90 +67,62 @@ def laboratory_tests(
     at = float(np.max(values["pressure"]))
     bars = " and ".join(f"{1e-5 * p:.1f}" for p in pressures)
 
-    def rows(measure: Callable[[Tire], Sequence[float] | FloatArray]) -> FloatArray:
-        return _slopes(measure, values, free)
-
-    def turn(*at: float) -> Callable[[Tire], FloatArray]:
+    def turn(*at: float) -> Measure:
         return lambda tire: np.log(np.array([_rim(tire, p)[1] for p in at]))
 
-    def rim(*at: float) -> Callable[[Tire], FloatArray]:
+    def rim(*at: float) -> Measure:
         return lambda tire: np.log(np.array([_rim(tire, p) for p in at])).ravel()
 
     def modes(tire: Tire) -> FloatArray:
-        return np.asarray(
-            np.log(
-                natural_frequency(
-                    ORDERS,
-                    ring_radius=tire.ring_radius,
-                    bending_stiffness=tire.bending_stiffness,
-                    radial_stiffness=tire.radial_stiffness,
-                    tangential_stiffness=tire.tangential_stiffness,
-                    inflation=at * tire.belt_width,
-                    mass=tire.mass,
-                )
-            )
+        found = natural_frequency(
+            ORDERS,
+            ring_radius=tire.ring_radius,
+            bending_stiffness=tire.bending_stiffness,
+            radial_stiffness=tire.radial_stiffness,
+            tangential_stiffness=tire.tangential_stiffness,
+            inflation=at * tire.belt_width,
+            mass=tire.mass,
         )
+        return np.asarray(np.log(found))
 
-    weighed = np.full((ORDERS.size, ORDERS.size), (0.5 * MASS) ** 2)
+    def test(words: str, accuracy: float, measure: Measure, together: float = 0.0) -> Test:
+        rows = _slopes(measure, values, free)
+        covariance = accuracy**2 * np.eye(len(rows)) + together**2
+        return Test(words, rows, np.asarray(covariance), True)
+
+    one, both = f"(S_theta to {SIDEWALL:.0%})", f"(S_v, S_theta to {SIDEWALL:.0%})"
     apart: tuple[Test, ...] = ()
     if _stands(values, pressures):
         apart = (
-            Test(
-                f"torsional sidewall tests (S_theta to {SIDEWALL:.0%}) at {bars} bar",
-                rows(turn(*pressures)),
-                _independent(2, SIDEWALL),
-                True,
-            ),
-            Test(
-                f"sidewall tests (S_v, S_theta to {SIDEWALL:.0%}) at {bars} bar",
-                rows(rim(*pressures)),
-                _independent(4, SIDEWALL),
-                True,
-            ),
+            test(f"torsional sidewall tests {one} at {bars} bar", SIDEWALL, turn(*pressures)),
+            test(f"sidewall tests {both} at {bars} bar", SIDEWALL, rim(*pressures)),
         )
     return (
-        Test(
-            f"a torsional sidewall test (S_theta to {SIDEWALL:.0%})",
-            rows(turn(at)),
-            _independent(1, SIDEWALL),
-            True,
-        ),
-        Test(
-            f"sidewall tests (S_v, S_theta to {SIDEWALL:.0%})",
-            rows(rim(at)),
-            _independent(2, SIDEWALL),
-            True,
-        ),
+        test(f"a torsional sidewall test {one}", SIDEWALL, turn(at)),
+        test(f"sidewall tests {both}", SIDEWALL, rim(at)),
         *apart,
-        Test(
+        test(
             f"a modal test (orders 1 to 8 to {MODAL:.0%}, mass to {MASS:.0%})",
-            rows(modes),
-            _independent(ORDERS.size, MODAL) + weighed,
-            True,
+            MODAL,
+            modes,
+            0.5 * MASS,
         ),
-        Test(
+        test(
             f"a press test of the tread alone (k_t to {TREAD:.0%})",
-            rows(lambda tire: [np.log(tire.tread_stiffness)]),
-            _independent(1, TREAD),
-            True,
+            TREAD,
+            lambda tire: [np.log(tire.tread_stiffness)],
         ),
-        Test(
+        test(
             f"the growth of the belt with pressure (EA to {GROWTH:.0%})",
-            rows(lambda tire: [np.log(tire.extension_stiffness)]),
-            _independent(1, GROWTH),
-            True,
+            GROWTH,
+            lambda tire: [np.log(tire.extension_stiffness)],
         ),
-        Test(
+        test(
             f"a cut section (gage offset to {SECTION:.0%})",
-            rows(lambda tire: [np.log(-tire.innerliner_offset)]),
-            _independent(1, SECTION),
-            True,
+            SECTION,
+            lambda tire: [np.log(-tire.innerliner_offset)],
         ),
     )
-
-
-def _independent(size: int, accuracy: float) -> FloatArray:
-    return np.asarray(accuracy**2 * np.eye(size))
 
 
 def _stiffness(tire: Tire, pressure: float) -> tuple[float, float]:
@@ -182,7 +157,7 @@ def _rim(tire: Tire, pressure: float) -> tuple[float, float]:
 
 
 def _slopes(
-    measure: Callable[[Tire], Sequence[float] | FloatArray],
+    measure: Measure,
     values: Mapping[str, float | FloatArray],
     free: tuple[Coordinate, ...],
 ) -> FloatArray:
