@@ -15,7 +15,7 @@ from tests.synthetic import LATERAL, RATE, header
 from tests.unit.compare.compare_synthetic import bump, model_file, plan, points_of
 from tirelib.brush.predict import PointConditions, predict_forces
 from tirelib.campaign import Run, RunPlan, write_campaign
-from tirelib.compare.forces import brush_of
+from tirelib.identify.brush_model import brush_of
 from tirelib.identify.force_data import ForceData
 from tirelib.model.base import values_of
 from tirelib.model.solution import solved
@@ -95,7 +95,7 @@ def force_runs(excess: float = 0.0, repeats: int = 2) -> Iterable[Run]:
                 }
                 data = ForceData(**one, block=np.zeros(1, dtype=np.int64))
                 at = PointConditions(data.load, data.slip_angle)
-                found = predict_forces(brush_of(brush_file(), data), at)
+                found = predict_forces(brush_of(brush_file()).parameters(data), at)
                 side = float(found.Fy[0]) + 8.0 * float(rng.standard_normal())
                 if abs(angle) > 4.0:
                     side -= excess * np.sign(side)

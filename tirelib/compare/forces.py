@@ -14,19 +14,22 @@ import numpy as np
 from scipy import special
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.brush.predict import PointParameters
 from tirelib.campaign import Campaign
 from tirelib.compare.floor import last_floor
-from tirelib.compare.force_model import ForceModel, force_model_of
+from tirelib.compare.force_model import (
+    ForceModel,
+    force_model_of,
+    quantities_of,
+    slips,
+    strain_effects,
+    usable_points,
+)
 from tirelib.compare.model import UsedEffect
 from tirelib.compare.sentences import told
 from tirelib.compare.strain import verdict_of
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.errors import CalibrationError, ParameterError
-from tirelib.identify import brush_model
-from tirelib.identify.brush_fit import ANGLE_SPAN, RATIO_SPAN
 from tirelib.identify.error_bands import levels
-from tirelib.identify.force_data import FORCES, ForceData, force_data
+from tirelib.identify.force_data import ForceData, force_data
 from tirelib.identify.force_noise import force_noise
 from tirelib.identify.force_points import CELL_ANGLE, ForcePoints, force_points
 from tirelib.parameters import TireFile
@@ -148,17 +151,6 @@ class ForceComparison:
         return np.asarray(self.predicted - self.measured)
 
 
-def brush_of(file: TireFile, data: ForceData) -> PointParameters:
-    """Return the brush of a model at points, without its effects.
-
-    Raises
-    ------
-    CalibrationError
-        If the model states no brush.
-    """
-    return brush_model.brush_of(file).parameters(data)
-
-
 def compare_forces(
     campaign: Campaign,
     file: TireFile,
@@ -196,65 +188,6 @@ def compare_forces(
     ]
     best = max(every, key=_lack)
     return replace(best, messages=(*best.messages, *left_out))
-
-
-def quantities_of(campaign: Campaign, points: ForcePoints, quantity: str | None) -> list[str]:
-    """Return the forces to look at: the one that is asked for, else those with slip.
-
-    Raises
-    ------
-    ParameterError
-        If the quantity is no force.
-    CalibrationError
-        If it is not measured.
-    """
-    if quantity is not None and quantity not in FORCES:
-        raise ParameterError(
-            f"--quantity {quantity}: allowed are strain, {', '.join(FORCES)}; correct the name"
-        )
-    data = points.data
-    measured = [name for name in FORCES if np.isfinite(getattr(data, name)).any()]
-    slipping = [name for name in measured if slips(data, name)]
-    wanted = (slipping or measured) if quantity is None else [quantity]
-    if not wanted or wanted[0] not in measured:
-        raise CalibrationError(
-            f"{campaign.header.name}: {quantity or 'Fy, Fx and Mz'} is not measured; there is "
-            f"{', '.join(measured) or 'no force at all'}; choose another --quantity"
-        )
-    return wanted
-
-
-def usable_points(campaign: Campaign, model: ForceModel, points: ForcePoints) -> ForcePoints:
-    """Return the points at which the model's contact is known.
-
-    Raises
-    ------
-    CalibrationError
-        If there is none.
-    """
-    if model.brush.tire is None and not model.values.get("pressure_power"):
-        return points
-    known = np.isfinite(points.data.pressure)
-    if not known.any():
-        raise CalibrationError(
-            f"{campaign.header.name}: the inflation pressure is unknown in every run; the model "
-            "needs it for the contact length; record it or give it as a set point"
-        )
-    return points.take(known)
-
-
-def strain_effects(file: TireFile, model: ForceModel) -> list[str]:
-    """Return the names of a file's effects that forces do not show."""
-    mine = {used.effect.name for used in model.used}
-    named = [entry["effect"] for entry in file.extra.get("effects", []) if isinstance(entry, dict)]
-    return [name for name in named if name not in mine]
-
-
-def slips(data: ForceData, name: str) -> bool:
-    """Whether the slip that a force comes from varies."""
-    if name == "Fx":
-        return bool(np.ptp(data.slip_ratio) >= RATIO_SPAN)
-    return bool(np.ptp(data.slip_angle) >= ANGLE_SPAN)
 
 
 def _lack(found: ForceComparison) -> float:

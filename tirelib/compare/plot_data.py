@@ -17,8 +17,8 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign, Run
 from tirelib.compare.force_curves import set_point_levels
-from tirelib.compare.force_model import force_model_of
-from tirelib.compare.forces import ForceComparison, usable_points
+from tirelib.compare.force_model import force_model_of, usable_points
+from tirelib.compare.forces import ForceComparison
 from tirelib.compare.model import Model
 from tirelib.compare.runs import Chosen, choose
 from tirelib.compare.strain import Comparison

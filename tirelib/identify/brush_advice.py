@@ -19,7 +19,7 @@ from tirelib.identify.brush_misfit import ForceMisfit, Shape, kernel
 from tirelib.identify.brush_problem import ASSUMED_HALF_LENGTH, BrushProblem
 from tirelib.identify.brush_study import Study
 from tirelib.identify.force_data import ForceData
-from tirelib.identify.ring_patch import half_lengths
+from tirelib.identify.ring_patch import ring_half
 
 PRIOR = 1.0
 """Standard deviation of every z before any measurement."""
@@ -180,7 +180,7 @@ def _information(
         problem,
         data=joined,
         forces=(force,),
-        half=_half(study, joined),
+        half=ring_half(study.fit.tire, joined),
         scale=np.array([_scale(study, force)]),
     )
     slope = here.jacobian(z)
@@ -221,11 +221,6 @@ def _steady(
     unknown = np.full(load.size, np.nan)
     block = np.arange(load.size)
     return ForceData(load, pressure, angle, ratio, camber, unknown, one, one, one, block)
-
-
-def _half(study: Study, data: ForceData) -> FloatArray | None:
-    tire = study.fit.tire
-    return None if tire is None else half_lengths(tire, data.load, data.pressure)
 
 
 def _points(at: Conditions) -> ForceData:

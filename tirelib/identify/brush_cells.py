@@ -118,12 +118,13 @@ class _Mean:
 
 def sliding_slips(brush: PointParameters, load: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the slip angles [rad] and slip ratios at which the whole contact slides."""
-    across, along = _stiffness(brush)
+    across, along = slip_stiffnesses(brush)
     force = 3.0 * np.asarray(brush.friction) * load
     return np.arctan(force / across), np.asarray(force / along)
 
 
-def _stiffness(brush: PointParameters) -> tuple[FloatArray, FloatArray]:
+def slip_stiffnesses(brush: PointParameters) -> tuple[FloatArray, FloatArray]:
+    """Return 2 c a^2 over slip angle [N/rad] and slip ratio [N]."""
     size = 2.0 * np.asarray(brush.half_length, dtype=np.float64) ** 2
     across = np.asarray(brush.lateral_stiffness, dtype=np.float64)
     along = brush.longitudinal_stiffness
@@ -136,7 +137,7 @@ def _bend(force: str, brush: PointParameters, data: ForceData) -> FloatArray:
     With x the demand over mu Fz, the brush is x - x^2/3 + x^3/27 of either sign of slip, and the
     other curve tanh x; for the moment x (1 - x/3)^3 and x / cosh^2(3 x / 4).
     """
-    across, along = _stiffness(brush)
+    across, along = slip_stiffnesses(brush)
     limit = np.asarray(brush.friction) * data.load
     thrust = np.asarray(brush.camber_thrust) * data.camber
     side = -across * np.tan(data.slip_angle + np.asarray(brush.slip_angle_offset) + thrust)

@@ -21,18 +21,9 @@ from tirelib.errors import CalibrationError, ParameterError
 from tirelib.identify.brush_law import NEUTRAL, SPECS, Reference, point_parameters, predict
 from tirelib.identify.brush_problem import ASSUMED_HALF_LENGTH, BrushProblem
 from tirelib.identify.error_bands import BandError, band_errors
-from tirelib.identify.force_checks import (
-    ANGLE_SPAN as ANGLE_SPAN,
-)
-from tirelib.identify.force_checks import (
-    RATIO_SPAN as RATIO_SPAN,
-)
-from tirelib.identify.force_checks import (
-    refuse_wrong_forces,
-    slips_vary,
-)
+from tirelib.identify.force_checks import refuse_wrong_forces, slips_vary
 from tirelib.identify.force_data import FORCES, ForceData
-from tirelib.identify.ring_patch import half_lengths
+from tirelib.identify.ring_patch import ring_half
 from tirelib.parameters import Tire
 
 LOAD_RATIO = 1.1
@@ -81,28 +72,6 @@ class BrushFit:
     points: int
 
     @property
-    def cornering_stiffness(self) -> tuple[float, float]:
-        """C = 2 c_py a^2 at the reference load and pressure and its standard deviation, [N/rad]."""
-        values = self.values
-        half = values.get("half_length")
-        if half is None and self.tire is not None:
-            at = np.array([self.reference.load]), np.array([self.reference.pressure])
-            half = float(half_lengths(self.tire, *at)[0])
-        assert half is not None  # noqa: S101 - without a ring it is fitted or held
-        size = 2.0 * values["lateral_stiffness"] * half**2
-        slope = np.array(
-            [
-                {"lateral_stiffness": 1.0, "half_length": 2.0}.get(n, 0.0) * size / values[n]
-                if values[n]
-                else 0.0
-                for n in self.names
-            ]
-        )
-        used = slope != 0.0
-        part = self.covariance[np.ix_(used, used)]
-        return size, float(np.sqrt(slope[used] @ part @ slope[used]))
-
-    @property
     def values(self) -> dict[str, float]:
         """Every parameter, fitted or held."""
         fitted = dict(zip(self.names, self.value.tolist(), strict=True))
@@ -110,11 +79,11 @@ class BrushFit:
 
     def parameters(self, data: ForceData) -> PointParameters:
         """Return the brush at the points of other data."""
-        return point_parameters(self.values, data, self.reference, _ring(self.tire, data))
+        return point_parameters(self.values, data, self.reference, ring_half(self.tire, data))
 
     def predict(self, data: ForceData) -> PointForces:
         """Return the forces at the points of other data."""
-        return predict(self.values, data, self.reference, _ring(self.tire, data))
+        return predict(self.values, data, self.reference, ring_half(self.tire, data))
 
 
 def fit_brush(
@@ -161,7 +130,7 @@ def fit_brush(
     if not names:
         raise ParameterError("brush fit: every parameter is held; leave one free")
     reference = Reference(float(np.median(data.load)), float(np.median(data.pressure)))
-    problem = BrushProblem(data, wanted, names, fixed, reference, _ring(tire, data))
+    problem = BrushProblem(data, wanted, names, fixed, reference, ring_half(tire, data))
     z = problem.start()
     few = len(data) > _START_POINTS
     if few:
@@ -308,7 +277,3 @@ def _status(name: str, value: float, spread: float, limit: float, *, assumed: bo
     if not spread <= limit or (assumed and stiffness):
         return "not identifiable from this campaign"
     return "ok"
-
-
-def _ring(tire: Tire | None, data: ForceData) -> FloatArray | None:
-    return None if tire is None else half_lengths(tire, data.load, data.pressure)

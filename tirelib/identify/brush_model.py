@@ -18,7 +18,7 @@ from tirelib.brush.predict import PointForces, PointParameters
 from tirelib.errors import CalibrationError
 from tirelib.identify.brush_law import SPECS, Reference, point_parameters, predict
 from tirelib.identify.force_data import ForceData
-from tirelib.identify.ring_patch import half_lengths
+from tirelib.identify.ring_patch import ring_half
 from tirelib.parameters import Number, Tire, TireFile
 
 STORED: Mapping[str, str] = MappingProxyType(
@@ -71,14 +71,11 @@ class BrushModel:
         ParameterError
             If ring or law need a pressure that is not known.
         """
-        return point_parameters(self.values, data, self.reference, self._ring(data))
+        return point_parameters(self.values, data, self.reference, ring_half(self.tire, data))
 
     def predict(self, data: ForceData) -> PointForces:
         """Return Fx, Fy and Mz at the points of data; errors as `parameters`."""
-        return predict(self.values, data, self.reference, self._ring(data))
-
-    def _ring(self, data: ForceData) -> FloatArray | None:
-        return None if self.tire is None else half_lengths(self.tire, data.load, data.pressure)
+        return predict(self.values, data, self.reference, ring_half(self.tire, data))
 
 
 def brush_of(file: TireFile) -> BrushModel:

@@ -7,13 +7,12 @@ import numpy as np
 from scipy.special import stdtrit
 
 from tirelib.arrays import FloatArray
-from tirelib.identify.brush_cells import cells_of
+from tirelib.identify.brush_cells import cells_of, slip_stiffnesses
 from tirelib.identify.brush_fit import BrushFit
-from tirelib.identify.brush_law import point_parameters
 from tirelib.identify.brush_misfit import Misfit, misfit_of
 from tirelib.identify.brush_problem import BrushProblem
 from tirelib.identify.force_data import ForceData
-from tirelib.identify.ring_patch import half_lengths
+from tirelib.identify.ring_patch import ring_half
 
 ROBUST = 3.0
 
@@ -51,7 +50,7 @@ class Study:
 
 def study_of(fit: BrushFit, data: ForceData) -> Study:
     """Return the study of a fit to data."""
-    half = None if fit.tire is None else half_lengths(fit.tire, data.load, data.pressure)
+    half = ring_half(fit.tire, data)
     problem = BrushProblem(data, tuple(fit.rmse), fit.names, fit.held, fit.reference, half)
     z = problem.z_of(fit.value)
     problem = problem.weighed(problem.misfit(z))
@@ -72,15 +71,8 @@ def stiffness_at(
     zero, none = np.zeros_like(load), np.full_like(load, np.nan)
     where = np.full_like(load, fit.reference.pressure) if pressure is None else pressure
     data = ForceData(load, where, zero, zero, zero, none, none, none, none, zero.astype(np.int64))
-    half = None if fit.tire is None else half_lengths(fit.tire, load, where)
-    at = point_parameters(fit.values, data, fit.reference, half)
-    size = 2.0 * np.asarray(at.half_length, dtype=np.float64) ** 2
-    across = np.asarray(at.lateral_stiffness, dtype=np.float64)
-    along = at.longitudinal_stiffness
-    return {
-        "slip_angle": across * size,
-        "slip_ratio": (across if along is None else np.asarray(along, dtype=np.float64)) * size,
-    }
+    across, along = slip_stiffnesses(fit.parameters(data))
+    return {"slip_angle": across, "slip_ratio": along}
 
 
 def known_pressure(value: float) -> float:

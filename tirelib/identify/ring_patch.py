@@ -8,6 +8,7 @@ from tirelib.contact.profiles import PressureProfile, parabola, sampled
 from tirelib.contact.radial import RadialContact, load
 from tirelib.contact.tread import Tread
 from tirelib.errors import ParameterError
+from tirelib.identify.force_data import ForceData
 from tirelib.parameters import Tire
 from tirelib.ring.compliance import Compliance, compliance
 from tirelib.ring.ring import Ring
@@ -68,6 +69,11 @@ def half_lengths(tire: Tire, vertical_load: FloatArray, pressure: FloatArray) ->
         side, across, _half(tire, ring_contact(tire, f, p)).reshape(_GRID)
     )
     return np.asarray(surface.ev(loads, np.clip(pressures, low, high)), dtype=np.float64)
+
+
+def ring_half(tire: Tire | None, data: ForceData) -> FloatArray | None:
+    """Return the half contact lengths of a tire's ring at points, [m]; None without a ring."""
+    return None if tire is None else half_lengths(tire, data.load, data.pressure)
 
 
 def profiles(

@@ -64,27 +64,19 @@ def _lines(document: Mapping[str, Any]) -> list[tuple[str, str]]:
     times = max((len(each["time"]) for each in document["changes"]), default=0)
     usual = _judged(tires, document["fewest"]["tires"], "campaigns of one size of tire", "identify")
     still = _judged(times, document["fewest"]["in_time"], "recordings of one wheel", "estimate")
+    stand = usual or "no tire, beyond its interval and the scatter of the others"
+    change = still or "none, beyond the scatter of the recordings"
     lines = [
-        (
-            "Stand out",
-            _some(odd) or usual or "no tire, beyond its interval and the scatter of the others",
-        ),
-        (
-            "Change with time",
-            _some(changing) or still or "none, beyond the scatter of the recordings",
-        ),
+        ("Stand out", _some(odd) or stand),
+        ("Change with time", _some(changing) or change),
         ("Effects", count or ("none named" if document["effects"] else NOT_YET["diagnose"])),
         ("Failed", f"{failed}, see the causes below" if failed else "none"),
     ]
     if document["negative"]:
         lines.append(("Negative answers", f"{len(document['negative'])}, see below"))
     if gains:
-        lines.append(
-            (
-                "Joined tires",
-                f"the standard deviations fall by a factor of up to {max(gains):.2f} (see below)",
-            )
-        )
+        fall = f"the standard deviations fall by a factor of up to {max(gains):.2f} (see below)"
+        lines.append(("Joined tires", fall))
     return lines
 
 
@@ -127,7 +119,9 @@ def _link(page: str, text: str) -> Markup:
     return Markup('<a href="{}">{}</a>').format(page, text) if page else Markup.escape(text)
 
 
-_WHICH: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
+_Columns = Mapping[str, Callable[[Mapping[str, Any]], str]]
+_OF: _Columns = {"tire": lambda row: _link(row["page"], row["tire"])}
+_WHICH: _Columns = {
     "campaign": lambda row: _link(row["page"], row["name"]),
     "tire": lambda row: row["tire"],
     "task": lambda row: row["task"],
@@ -141,7 +135,7 @@ def _parameters(parameters: Sequence[Mapping[str, Any]]) -> Part:
         "Tires that stand out",
         odd,
         {
-            "tire": lambda row: _link(row["page"], row["tire"]),
+            **_OF,
             "campaign": lambda row: row["campaign"],
             "parameter": lambda row: row["name"],
             "unit": lambda row: row["unit"],
@@ -265,47 +259,12 @@ def _change_plot(channel: str, series: Sequence[Mapping[str, Any]]) -> Plot:
 
 
 def _effects(effects: Sequence[Mapping[str, Any]]) -> Part:
-    plots = []
     names = sorted({name for each in effects for name in (*each["named"], *each["hints"])})
-    if names:
-        tires = [f"{each['tire']}, {each['campaign']}" for each in effects]
-        level = [
-            [2 if name in each["named"] else int(name in each["hints"]) for each in effects]
-            for name in names
-        ]
-        figure = go.Figure(
-            go.Heatmap(
-                x=tires,
-                y=names,
-                z=level,
-                zmin=0,
-                zmax=2,
-                colorscale=[[0.0, "#f2f4f6"], [0.5, "#9ecae1"], [1.0, RED]],
-                xgap=2,
-                ygap=2,
-                showscale=False,
-                customdata=[[each["page"] for each in effects] for _ in names],
-                hovertemplate="%{x}<br>%{y}<extra></extra>",
-            )
-        )
-        styled_figure(figure, 180 + 26 * len(names))
-        figure.update_xaxes(showticklabels=len(tires) <= 40)
-        rows = [[t, n, level[j][i]] for i, t in enumerate(tires) for j, n in enumerate(names)]
-        plots.append(
-            Plot(
-                "effects",
-                "Effects by tire",
-                "Orange: named. Blue: a hint. Grey: neither. ",
-                figure,
-                ("tire", "effect", "level"),
-                rows,
-            )
-        )
     table = Table.of(
         "Verdicts",
         effects[:MOST_ROWS],
         {
-            "tire": lambda each: _link(each["page"], each["tire"]),
+            **_OF,
             "campaign": lambda each: each["campaign"],
             "quantity": lambda each: each["quantity"],
             "verdict": lambda each: each["verdict"],
@@ -314,7 +273,42 @@ def _effects(effects: Sequence[Mapping[str, Any]]) -> Part:
         },
         texts=6,
     )
+    plots = [_effect_plot(effects, names)] if names else []
     return Part("Effects by tire", "effects", "", [table] if table.rows else [], plots)
+
+
+def _effect_plot(effects: Sequence[Mapping[str, Any]], names: Sequence[str]) -> Plot:
+    tires = [f"{each['tire']}, {each['campaign']}" for each in effects]
+    level = [
+        [2 if name in each["named"] else int(name in each["hints"]) for each in effects]
+        for name in names
+    ]
+    figure = go.Figure(
+        go.Heatmap(
+            x=tires,
+            y=names,
+            z=level,
+            zmin=0,
+            zmax=2,
+            colorscale=[[0.0, "#f2f4f6"], [0.5, "#9ecae1"], [1.0, RED]],
+            xgap=2,
+            ygap=2,
+            showscale=False,
+            customdata=[[each["page"] for each in effects] for _ in names],
+            hovertemplate="%{x}<br>%{y}<extra></extra>",
+        )
+    )
+    styled_figure(figure, 180 + 26 * len(names))
+    figure.update_xaxes(showticklabels=len(tires) <= 40)
+    rows = [[t, n, level[j][i]] for i, t in enumerate(tires) for j, n in enumerate(names)]
+    return Plot(
+        "effects",
+        "Effects by tire",
+        "Orange: named. Blue: a hint. Grey: neither. ",
+        figure,
+        ("tire", "effect", "level"),
+        rows,
+    )
 
 
 def _joined(parameters: Sequence[Mapping[str, Any]]) -> Part:
@@ -328,7 +322,7 @@ def _joined(parameters: Sequence[Mapping[str, Any]]) -> Part:
         "Joined numbers",
         rows[:MOST_ROWS],
         {
-            "tire": lambda row: _link(row["page"], row["tire"]),
+            **_OF,
             "parameter": lambda row: row["name"],
             "unit": lambda row: row["unit"],
             "campaigns": lambda row: str(row["campaigns"]),

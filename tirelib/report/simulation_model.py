@@ -152,13 +152,9 @@ def simulate_model(
         assert deflection is not None  # noqa: S101 - the caller has looked
         load = _load_at(model, values, conditions, deflection, low_pass, tire)
     points = conditions.at(load, tire.ring_radius)
-    if model.large:
-        found = _solved(model, values, points, low_pass)
-        curves, depth = _of_rolling(found), found.deflection
-    else:
-        state = _linear(model, values, points, low_pass)
-        curves, depth = _of_linear(state), state.deflection
-    return _simulation(tire, curves, depth, points)
+    found = _pressed(model, values, points, low_pass)
+    curves = _of_rolling(found) if isinstance(found, Solution) else _of_linear(found)
+    return _simulation(tire, curves, found.deflection, points)
 
 
 def _check_known(model: Model, conditions: Conditions) -> None:
@@ -170,18 +166,12 @@ def _check_known(model: Model, conditions: Conditions) -> None:
         )
 
 
-def _solved(
+def _pressed(
     model: Model, values: Mapping[str, float | FloatArray], points: Operating, low_pass: LowPass
-) -> Solution:
-    """Return the rolling ring over `TURN` as `compare` predicts it."""
-    return solved(values, points, model.changes, low_pass=low_pass, phi=TURN)
-
-
-def _linear(
-    model: Model, values: Mapping[str, float | FloatArray], points: Operating, low_pass: LowPass
-) -> State:
-    """Return the linear ring over `TURN`."""
-    return predict(values, points, model.changes, low_pass=low_pass, phi=TURN)
+) -> Solution | State:
+    """Return the rolling ring over `TURN` as `compare` predicts it, or the linear ring."""
+    solve = solved if model.large else predict
+    return solve(values, points, model.changes, low_pass=low_pass, phi=TURN)
 
 
 def _load_at(
@@ -196,9 +186,7 @@ def _load_at(
 
     def depth(load: FloatArray) -> FloatArray:
         points = conditions.at(load, tire.ring_radius)
-        if model.large:
-            return _solved(model, values, points, low_pass).deflection
-        return _linear(model, values, points, low_pass).deflection
+        return _pressed(model, values, points, low_pass).deflection
 
     load = 1.2e5 * deflection  # a third less than a usual tire's 180 N/mm: an easy first solve
     more = load * (1.0 + TRIAL)

@@ -6,8 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tirelib.campaign import Campaign
-from tirelib.compare.force_model import ForceModel, force_model_of
-from tirelib.compare.forces import UNITS, quantities_of, slips, usable_points
+from tirelib.compare.force_model import (
+    ForceModel,
+    force_model_of,
+    quantities_of,
+    slips,
+    usable_points,
+)
+from tirelib.compare.forces import UNITS
 from tirelib.diagnose.diagnose import FALSE_ALARM, Finding
 from tirelib.diagnose.forces.diagnose import ForceDiagnosis, diagnose_force
 from tirelib.diagnose.forces.fit import ForceFit, Problem
