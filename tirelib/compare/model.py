@@ -51,7 +51,6 @@ class Model:
         Whether the correction for large displacements belongs to it.
     history : tuple of mapping
         What was added to the model and what the error did.
-    provenance : mapping
     sources : mapping of str to str
         Where each number of the tire comes from.
     """
@@ -61,7 +60,6 @@ class Model:
     used: tuple[UsedEffect, ...]
     large: bool
     history: tuple[Mapping[str, Any], ...]
-    provenance: Mapping[str, Any]
     sources: Mapping[str, str]
 
     @classmethod
@@ -78,7 +76,7 @@ class Model:
             )
             for effect, s in zip(effects, strengths, strict=True)
         )
-        return cls("fitted", values, used, True, (), {}, {})
+        return cls("fitted", values, used, True, (), {})
 
     @property
     def changes(self) -> Changes:
@@ -118,7 +116,6 @@ def model_of(file: TireFile, effects: Mapping[str, Effect] = CATALOGUE) -> Model
         used,
         kind == RINGS[0],
         tuple(item for item in file.extra.get("history", []) if isinstance(item, dict)),
-        dict(file.extra.get("provenance", {})),
         {name: f"{number.kind}: {number.source}" for name, number in file.numbers.items()},
     )
 

@@ -12,6 +12,7 @@ from tirelib.diagnose.forces.document import force_diagnosis_document
 from tirelib.diagnose.forces.models import plain_tires
 from tirelib.effects import CATALOGUE
 from tirelib.errors import ParameterError
+from tirelib.infer.problem import Point
 from tirelib.infer.select import Hypotheses
 from tirelib.planning.criterion import NOTHING, NextTest
 from tirelib.planning.document import plan_document, plan_force_test
@@ -123,15 +124,23 @@ def test_points_ahead_are_seen_with_the_coefficients_of_the_present_ones() -> No
     """What may explain a residual ahead goes on as it does in the present points."""
     made, test = case(*WEAK), planned()
     problem = made.as_given(BRUSH)
-    bench = bench_ahead(made.problem.bench, made.model, test.envelope, test.points[:5])
-    ahead, n = problem.followed_by(bench, np.ones(5)), len(made.problem)
-    assert ahead.run_ahead.tolist() == [-1] * n + list(range(5))
+    n, more = len(made.problem), 2 * len(made.problem)  # so many that they would rule all means
+    wanted = np.repeat(test.points[:1], more, axis=0)
+    bench = bench_ahead(made.problem.bench, made.model, test.envelope, wanted)
+    ahead = problem.followed_by(bench, np.ones(more))
+    assert ahead.run_ahead.tolist() == [-1] * n + list(range(more))
     here, there = problem.solve(problem.start), ahead.solve(problem.start)
     assert there.rest[:n] == pytest.approx(here.rest)
     assert there.rest[n:] == pytest.approx(-there.force[n:])
     for name, rows in problem.remainder(problem.start, here).items():
         found = ahead.remainder(problem.start, there)[name][:, :n]
         assert found == pytest.approx(rows, abs=1e-4 * np.abs(rows).max())
+    point = Point(problem.start.base, (CATALOGUE["friction_load"],), (np.array([0.1]),))
+    errors = []
+    for each in (problem, ahead):
+        solved = each.solve(point)
+        errors.append(each.roughly(point, solved, each.slopes(point, solved), 1)[0][:, :n])
+    assert errors[1] == pytest.approx(errors[0], abs=1e-4 * np.abs(errors[0]).max())
     # the same points once more behind themselves: every row is repeated
     joint = made.problem.bench.take(np.tile(np.arange(n), 2))
     block = np.concatenate([np.arange(n), n + np.arange(n)])
@@ -142,6 +151,10 @@ def test_points_ahead_are_seen_with_the_coefficients_of_the_present_ones() -> No
         assert rows[:, n:] == pytest.approx(rows[:, :n], abs=1e-9 * np.abs(rows).max())
     white = twice.whitener(0.001)(solved.force[None])[0]
     assert white[n:] == pytest.approx(white[:n])
+    # the mean of four is twice as sure, noise and set points
+    four = problem.followed_by(twice.bench, np.full(n, 4.0)).whitener(0.0)
+    white = four(solved.force[None])[0]
+    assert white[n:] == pytest.approx(2.0 * white[:n])
 
 
 def test_a_point_ahead_is_told_in_engineers_units_and_repeats_add() -> None:

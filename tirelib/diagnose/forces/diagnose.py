@@ -57,11 +57,6 @@ class ForceDiagnosis:
         """Effects that the points cannot show, with the reason."""
         return self.models.given.dead
 
-    @property
-    def exceeds(self) -> bool:
-        """Whether more is left than plain tires leave."""
-        return self.verdict.kind in ("unknown", "form_inadequate")
-
     def error_with(self, finding: Finding) -> float:
         """Return the rms with one effect alone, to first order unless it is named, SI."""
         if finding.effect.name in self.alone:
