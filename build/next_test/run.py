@@ -31,8 +31,8 @@ from tirelib.planning.document import PROMISING
 from tirelib.threads import one_thread
 
 VISIBLE = 17.0
-"""Chi-square by which the campaign alone shows the effect, against none, in the metric of
-structure: that at which a run at random parts about 45 % of the pairs, on seeds from 1400 on."""
+"""Chi-square by which the campaign alone shows the effect, against none, in the metric of what
+plain tires show."""
 _PARTS = (
     "diagnose",
     "effects",
