@@ -13,7 +13,7 @@ from tirelib.arrays import FloatArray, IntArray
 from tirelib.compare.regions import LEVEL, Region, find_regions
 from tirelib.compare.runs import Chosen
 from tirelib.compare.sectors import Cell, cells, weighted_variance
-from tirelib.compare.sentences import amount, extent, millimeters, small
+from tirelib.compare.sentences import amount, extent, millimetres, small
 from tirelib.compare.set_points import SetPoints
 from tirelib.identify.noise import RepeatNoise, repeat_noise
 from tirelib.waveforms import GRID
@@ -154,7 +154,7 @@ def gage_sentences(gages: Sequence[Gage], edges: FloatArray) -> tuple[str, ...]:
             continue
         region = found.region
         out.append(
-            f"At the gage at y = {millimeters(gage.lateral)}, {extent(region, edges)}, "
+            f"At the gage at y = {millimetres(gage.lateral)}, {extent(region, edges)}, "
             f"from {region.start:.2f} to {region.stop:.2f} rad, in all runs, the model shows "
             f"{amount(found.mean, region.measured)} (95 % \N{PLUS-MINUS SIGN} "
             f"{small(1.96e6 * found.std)}, {region.runs} runs); of the mean over the gages it "

@@ -116,12 +116,12 @@ def small(value: float) -> str:
     return f"{value:,.0f}" if value >= 10 else f"{value:.1f}"
 
 
-def millimeters(y: float) -> str:
-    """Say a lateral position in whole millimeters with its sign; zero has none.
+def millimetres(y: float) -> str:
+    """Say a lateral position in whole millimetres with its sign; zero has none.
 
     Examples
     --------
-    >>> millimeters(0.06), millimeters(-1e-5)
+    >>> millimetres(0.06), millimetres(-1e-5)
     ('+60 mm', '0 mm')
     """
     whole = round(1e3 * y)

@@ -121,7 +121,7 @@ def next_step(
     return {"what": said[told.verdict](), "between": between, "would_revive": dict(lacking)}
 
 
-def listed(names: Sequence[str], none: str) -> str:
+def listed(names: Sequence[str], none: str = "") -> str:
     """Return names as words of a sentence."""
     words = list(names) or [none]
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

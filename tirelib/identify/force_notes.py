@@ -1,14 +1,10 @@
 """What of a campaign's forces cannot be used, in words: nothing is left out silently."""
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from tirelib.campaign import Campaign, Run
 from tirelib.identify.force_data import FORCES, FREE_ROLLING
-
-_NAMED = 6
-"""Runs that a message names."""
+from tirelib.identify.strain_notes import named
 
 
 def force_notes(campaign: Campaign) -> tuple[str, ...]:
@@ -40,17 +36,17 @@ def force_notes(campaign: Campaign) -> tuple[str, ...]:
             blank.setdefault("slip ratio", []).append(run.plan.run)
         if "camber" not in run.rig and not np.isfinite(run.plan.camber):
             blank.setdefault("camber", []).append(run.plan.run)
-    out = [f"{_runs(runs)}: {reason}; left out of the brush" for reason, runs in lost.items()]
+    out = [f"{named(runs)}: {reason}; left out of the brush" for reason, runs in lost.items()]
     if samples:
         out.append(
             f"{samples} samples of sweeps have no positive load or no slip angle, or are no "
             "number; left out of the brush"
         )
     out += [
-        f"{_runs(runs)}: {name} was not measured; its set point is used"
+        f"{named(runs)}: {name} was not measured; its set point is used"
         for name, runs in stood.items()
     ]
-    out += [f"{_runs(runs)}: {name} is unknown and taken as zero" for name, runs in blank.items()]
+    out += [f"{named(runs)}: {name} is unknown and taken as zero" for name, runs in blank.items()]
     return tuple(out)
 
 
@@ -71,9 +67,3 @@ def _bad_samples(run: Run) -> int:
 def _holds_nan(run: Run, name: str) -> bool:
     samples = run.rig.get(name)
     return samples is not None and samples.size > 0 and not bool(np.isfinite(samples).all())
-
-
-def _runs(numbers: Iterable[int]) -> str:
-    chosen = list(numbers)
-    names = ", ".join(map(str, chosen[:_NAMED])) + (", ..." if len(chosen) > _NAMED else "")
-    return f"run {names}" if len(chosen) == 1 else f"{len(chosen)} runs ({names})"

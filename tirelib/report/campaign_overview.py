@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from tirelib.campaign.model import CampaignHeader, FloatArray, Run
 from tirelib.campaign.overview import COLUMNS, Quantity, RunRow, place_label
 from tirelib.campaign.turns import trigger_samples, turn_samples
+from tirelib.report.style import new_figure
 from tirelib.units import from_si
 
 _BY_NAME = {column.name: column for column in COLUMNS}
@@ -42,8 +42,7 @@ def overview_figure(header: CampaignHeader, rows: Sequence[RunRow], runs: Sequen
         The few whose strain is drawn; with sweeps also those whose samples are drawn.
     """
     turns = [(run, turn) for run in runs if (turn := _one_turn(run, header)) is not None]
-    figure = Figure(figsize=(13.0, 8.6 if turns else 4.8), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(13.0, 8.6 if turns else 4.8)
     figure.suptitle(f"{header.name}: {header.tire.name}   (signs iso 8855, files {header.axes})")
     upper, *lower = figure.subfigures(2 if turns else 1, 1, squeeze=False)[:, 0]
     sweep = any(row.kind == "sweep" for row in rows)

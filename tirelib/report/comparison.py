@@ -7,6 +7,7 @@ import numpy as np
 from tirelib.compare.force_curves import curves_of
 from tirelib.compare.forces import UNITS as FORCE_UNITS
 from tirelib.compare.forces import ForceComparison
+from tirelib.compare.sentences import millimetres
 from tirelib.compare.strain import Comparison
 from tirelib.report.comparison_tables import (
     force_tables,
@@ -22,7 +23,6 @@ from tirelib.report.figures.compare_trends import set_point_plot, track_plots, t
 from tirelib.report.figures.compare_waveforms import waveform_plots
 from tirelib.report.page import Table, number
 from tirelib.report.parts_page import Part, write_parts_page
-from tirelib.report.style import millimetres
 
 SENTENCE_NOTE = (
     "Only significant differences are listed. Against noise and set-point errors the chance is 1 "

@@ -6,7 +6,7 @@ from tirelib.compare.force_curves import Curve
 from tirelib.compare.forces import UNITS as FORCE_UNITS
 from tirelib.compare.forces import ForceComparison, range_of
 from tirelib.compare.sectors import SECTORS, Cell
-from tirelib.compare.sentences import millimeters, told
+from tirelib.compare.sentences import millimetres, told
 from tirelib.compare.set_points import NAMES
 from tirelib.compare.strain import Comparison
 from tirelib.compare.track_words import track_fit
@@ -90,7 +90,7 @@ def gage_tables(found: Comparison) -> list[Table]:
             "Difference at each gage, straight and freely rolling runs",
             gages,
             {
-                "y (ISO 8855)": lambda g: millimeters(g.lateral),
+                "y (ISO 8855)": lambda g: millimetres(g.lateral),
                 "gage": lambda g: str(g.number + 1),
                 "noise [microstrain]": lambda g: number(1e6 * g.noise.std, 3),
                 "rms [microstrain]": lambda g: number(1e6 * g.rms, 4),
@@ -100,7 +100,7 @@ def gage_tables(found: Comparison) -> list[Table]:
         ),
         Table(
             "Mean difference of each gage in each sector [microstrain]",
-            ["sector", *(f"y = {millimeters(g.lateral)}" for g in gages)],
+            ["sector", *(f"y = {millimetres(g.lateral)}" for g in gages)],
             means,
             note="Model minus measurement, with 95 % intervals from the noise of the gage and the "
             "set points. A positive mean is too much tension.",

@@ -12,6 +12,7 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
+from tirelib.diagnose.told import listed
 from tirelib.infer.plain import ROUGHLY
 from tirelib.report.page import number, unit_name
 
@@ -194,7 +195,7 @@ def _other(names: Sequence[str], best: Sequence[str]) -> str:
     new, gone = ([n for n in a if n not in b] for a, b in ((names, best), (best, names)))
     if len(best) <= SHOWN or not gone:
         return " with ".join(names)
-    return f"{_and(new)} in the place of {_and(gone)}"
+    return f"{listed(new, '')} in the place of {listed(gone, '')}"
 
 
 def _blind(told: Mapping[str, Any]) -> list[str]:
@@ -259,7 +260,7 @@ def journey_explained(
         lines["error"] = error_line({**journey, "verdict": told["verdict"]})
         last = journey["steps"][-1]["model"]
         lines["next"] = (
-            f"The model with {_and(journey['added'])} is {last}. To look for more: tirelib "
+            f"The model with {listed(journey['added'])} is {last}. To look for more: tirelib "
             f"diagnose {folder} --model {last} --out {out / 'diagnosed-again'}"
         )
     return lines
@@ -376,10 +377,6 @@ def _some(names: Sequence[str]) -> str:
     listed = list(dict.fromkeys(names))
     more = f" and {len(listed) - SHOWN} more" if len(listed) > SHOWN else ""
     return ", ".join(listed[:SHOWN]) + more
-
-
-def _and(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def _what(told: Mapping[str, Any]) -> str:

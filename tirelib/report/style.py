@@ -113,12 +113,6 @@ def signed_degrees(value: float) -> str:
     return f"{whole:+d} deg" if whole else "0 deg"
 
 
-def millimetres(y: float) -> str:
-    """Return a lateral position in whole millimetres with its sign; zero has none."""
-    whole = round(1e3 * y)
-    return f"{whole:+d} mm" if whole else "0 mm"
-
-
 def diagonal(axes: Axes, *values: Iterable[float]) -> None:
     """Draw the line of perfect agreement over the range of the values, labelled."""
     every = np.concatenate([np.asarray(list(v), dtype=np.float64).ravel() for v in values])

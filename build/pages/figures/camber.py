@@ -3,10 +3,11 @@
 import numpy as np
 from matplotlib.figure import Figure
 
+from tirelib.compare.sentences import millimetres
 from tirelib.estimators.dissertation import Means
 from tirelib.report.figures.lateral_force import CAMBERS
 from tirelib.report.levels import camber_levels
-from tirelib.report.style import MARKERS, label, legend_below, millimetres, new_figure, styled
+from tirelib.report.style import MARKERS, label, legend_below, new_figure, styled
 
 
 @styled

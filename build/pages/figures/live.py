@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from pages.figures.strain import ANGLE, STRAIN
 from tirelib.arrays import FloatArray, IntArray
+from tirelib.compare.sentences import millimetres
 from tirelib.report.accuracy import QUANTITIES, SIGNED, TITLE, UNIT, WIDTH
 from tirelib.report.style import (
     BLACK,
@@ -19,7 +20,6 @@ from tirelib.report.style import (
     SKY,
     label,
     legend_below,
-    millimetres,
     new_figure,
     styled,
     zero_line,

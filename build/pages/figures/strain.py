@@ -5,6 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pages.turns import TypicalTurns
+from tirelib.compare.sentences import millimetres
 from tirelib.report.style import (
     BLACK,
     BLUE,
@@ -13,7 +14,6 @@ from tirelib.report.style import (
     ORANGE,
     label,
     legend_below,
-    millimetres,
     new_figure,
     sequence,
     styled,

@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.compare.document import edge_value
-from tirelib.compare.sentences import told
+from tirelib.compare.sentences import millimetres, told
 from tirelib.compare.strain import Comparison
 from tirelib.identify.error_bands import levels
 from tirelib.quantities import QUANTITIES
@@ -18,7 +18,6 @@ from tirelib.report.figures.compare_plot import (
     limit_of,
     styled_figure,
 )
-from tirelib.report.style import millimetres
 from tirelib.waveforms import GRID
 
 DEGREES = np.rad2deg(GRID)

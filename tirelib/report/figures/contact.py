@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
+from tirelib.compare.sentences import millimetres
 from tirelib.errors import CalibrationError
 from tirelib.estimators.dissertation import Means
 from tirelib.report.levels import angle_levels, load_levels, reference_level, upright
@@ -11,7 +12,6 @@ from tirelib.report.style import (
     MARKERS,
     label,
     legend_below,
-    millimetres,
     new_figure,
     styled,
 )
