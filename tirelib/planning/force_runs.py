@@ -13,7 +13,7 @@ from tirelib.identify.force_data import ForceData
 from tirelib.identify.force_points import ForcePoints
 from tirelib.planning.envelope import Envelope
 from tirelib.planning.sweep import campaign_sweep
-from tirelib.problems.forces import varies
+from tirelib.problems.force_plan import varies
 
 
 def force_axes(case: ForceCase) -> tuple[str, ...]:

@@ -17,8 +17,9 @@ from tirelib.identify.brush_law import SPECS
 from tirelib.identify.discrepancy import bumps
 from tirelib.identify.force_bench import Changes, ForceBench
 from tirelib.infer.problem import Point
-from tirelib.model.brush import BrushConditions, BrushState, brush_forces
+from tirelib.model.brush import BrushState, brush_forces
 from tirelib.model.brush_slopes import STEP, StateSlopes, moment_of
+from tirelib.problems.force_plan import SPANS, blind, varies
 from tirelib.problems.whiten_forces import PointWhitener
 
 COORDINATES: Mapping[str, tuple[str, ...]] = {
@@ -55,22 +56,6 @@ CONSTANT = 8.0
 LEAST_SIGNAL, LEAST_OWN = 3.0, 0.02
 """Whitened norm below which an effect at the end of its range is dead, and the share of it that the
 base must not be able to mimic."""
-SPANS = {
-    "load": 0.1,
-    "pressure": 0.03,
-    "speed": 0.1,
-    "slip_angle": np.deg2rad(1.0),
-    "slip_ratio": 0.01,
-    "camber": np.deg2rad(0.5),
-    "temperature": 5.0,
-}
-"""Least range of a condition: relative for load, pressure and speed, else [rad], [-], [K]."""
-_WORDS = {
-    "slip_angle": "slip angle",
-    "slip_ratio": "slip ratio",
-    "temperature": "tread temperature",
-    "slip_rate": "rate of the slip angle",
-}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -313,11 +298,8 @@ class ForceProblem:
             "speed": np.log(np.abs(at.speed) / middle["speed"]) if middle["speed"] else at.speed,
         }
         # a tire that rolls both ways at one speed has a speed that varies, and nothing goes with it
-        found = {
-            name: f
-            for name, f in every.items()
-            if varies(measured, name) and np.ptp(f[: self.present]) > 0.0
-        }
+        n = self.present
+        found = {k: f for k, f in every.items() if varies(measured, k) and np.ptp(f[:n]) > 0.0}
         return found | {"order": 2.0 * at.order - 1.0}
 
     def _by_set_points(self, solved: ForceSolved) -> FloatArray:
@@ -415,27 +397,3 @@ def changes_at(effects: Sequence[Effect], strengths: Sequence[FloatArray]) -> Ch
         effect.at(float(s[0]) if effect.components == 1 else tuple(float(x) for x in s))
         for effect, s in zip(effects, strengths, strict=True)
     ]
-
-
-def blind(at: BrushConditions, effect: Effect) -> str:
-    """Return why a plan cannot show an effect, or an empty text."""
-    if effect.untestable:
-        return effect.untestable
-    unknown = [_WORDS.get(name, name) for name in effect.unknown(at)]
-    if unknown:
-        return f"{' and '.join(unknown)} is not measured at every point"
-    if effect.varies_with and not any(varies(at, name) for name in effect.varies_with):
-        names = [_WORDS.get(name, name) for name in effect.varies_with]
-        return f"no run varies {' or '.join(names)}"
-    return ""
-
-
-def varies(at: BrushConditions, name: str) -> bool:
-    """Return whether a condition has a range in which an effect could show."""
-    if name not in SPANS:
-        return True
-    values = getattr(at, name)
-    if not np.isfinite(values).all():
-        return False
-    relative = name in ("load", "pressure", "speed")
-    return bool(np.ptp(values) > SPANS[name] * (np.abs(values).max() if relative else 1.0))

@@ -26,7 +26,8 @@ from tirelib.identify.force_data import force_data
 from tirelib.identify.force_noise import force_noise
 from tirelib.identify.force_points import ForcePoints, force_points
 from tirelib.parameters import TireFile
-from tirelib.problems.forces import ForceProblem, varies
+from tirelib.problems.force_plan import varies
+from tirelib.problems.forces import ForceProblem
 
 MOST_POINTS = 4000
 """Points that are fitted; of a longer sweep passes are left out evenly."""

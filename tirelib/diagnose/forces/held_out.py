@@ -15,7 +15,7 @@ from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force
 from tirelib.diagnose.held_out import Fold
 from tirelib.errors import TirelibError
 from tirelib.identify.force_points import set_points
-from tirelib.problems.forces import varies
+from tirelib.problems.force_plan import varies
 
 BLOCK = 11.0
 """Length of a held-out block of time, [s]."""

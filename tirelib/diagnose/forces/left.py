@@ -9,7 +9,8 @@ from tirelib.arrays import BoolArray, FloatArray
 from tirelib.diagnose.forces.fit import ForceFit, Problem
 from tirelib.diagnose.left import FLAT, Power, powers_of
 from tirelib.model.brush import BrushConditions
-from tirelib.problems.forces import slip_of, varies
+from tirelib.problems.force_plan import varies
+from tirelib.problems.forces import slip_of
 
 BANDS = (
     (0.0, 1.0, "where most of the contact sticks"),

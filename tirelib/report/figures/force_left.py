@@ -7,7 +7,7 @@ from tirelib.arrays import FloatArray, IntArray
 from tirelib.diagnose.forces.assess import ForceAssessment
 from tirelib.diagnose.forces.fit import ForceFit
 from tirelib.identify.error_bands import levels
-from tirelib.problems.forces import varies
+from tirelib.problems.force_plan import varies
 from tirelib.report.figures.compare_plot import DIVERGING, Plot, limit_of, styled_figure
 from tirelib.units import from_si
 
