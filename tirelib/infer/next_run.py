@@ -11,7 +11,7 @@ order about the fits.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Protocol
 
@@ -19,7 +19,6 @@ import numpy as np
 
 from tirelib.arrays import FloatArray, IntArray
 from tirelib.infer.hypothesis import Hypothesis
-from tirelib.infer.normal import Normal
 from tirelib.infer.null import Null
 from tirelib.infer.plain import View
 from tirelib.infer.posterior import coordinates_of, explaining
@@ -175,11 +174,5 @@ class _Forecast:
 def _with(null: Null, rows: FloatArray) -> Null:
     """Return a test with further whitened rows (m, n) behind those of its runs."""
     view, normal = null.view, null.view.normal
-    more = Normal(
-        normal.blocks,
-        normal.gram + rows @ rows.T,
-        normal.right,
-        normal.square,
-        normal.count + rows.shape[1],
-    )
+    more = replace(normal, gram=normal.gram + rows @ rows.T, count=normal.count + rows.shape[1])
     return null.about(View(view.own, more, view.log_volume, np.zeros(0)))

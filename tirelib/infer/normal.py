@@ -11,7 +11,7 @@ A block of rows a with the prior variance t, at its likeliest, raises the log de
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +37,8 @@ class Normal:
         Sum of squares of the residual.
     count : int
         Of its samples.
+    mean : shape (m,)
+        Coefficients that have been taken off the residual.
     """
 
     blocks: Mapping[str, slice]
@@ -44,6 +46,7 @@ class Normal:
     right: FloatArray
     square: float
     count: int
+    mean: FloatArray
 
     @classmethod
     def of(
@@ -63,7 +66,18 @@ class Normal:
         every = np.concatenate(list(rows.values()))
         if whiten is not None:
             every, rest = whiten(every), whiten(rest)
-        return cls(blocks, every @ every.T, every @ rest, float(rest @ rest), rest.size)
+        none = np.zeros(len(every))
+        return cls(blocks, every @ every.T, every @ rest, float(rest @ rest), rest.size, none)
+
+    def about(self, means: Mapping[str, float]) -> "Normal":
+        """Return the normal equations of what is left once blocks have these coefficients."""
+        mean = np.zeros(len(self.right))
+        for name, value in means.items():
+            if name in self.blocks:
+                mean[self.blocks[name]] = value
+        turned = self.gram @ mean
+        square = self.square - float(mean @ (2.0 * self.right - turned))
+        return replace(self, right=self.right - turned, square=square, mean=self.mean + mean)
 
     def spread(self, variance: Mapping[str, float | FloatArray]) -> FloatArray:
         """Return the diagonal of D, shape (m,), from variances by block; absent ones are zero."""

@@ -112,7 +112,8 @@ class Null:
         for size in _sizes(family.largest, shown):
             variance = {name: size.of(name) ** 2 * each for name, each in shown.items()}
             spread = view.normal.spread({**variance, **allowed})
-            self._weighed.append((size, Weighed(view.normal, spread)))
+            means = {name: size.of(name) * each for name, each in family.means.items()}
+            self._weighed.append((size, Weighed(view.normal.about(means), spread)))
 
     @cached_property
     def _levels(self) -> FloatArray:
@@ -147,8 +148,8 @@ class Null:
         rows = [j for j, _ in sided]
         first, side = [self.blocks[j].start for j in rows], np.array([each for _, each in sided])
         plain, free, signs = [], [], []
-        for level, weighed in self._at(products):
-            gram, here = weighed.gram, weighed.right(products[0])
+        for level, weighed, left in self._at(products):
+            gram, here = weighed.gram, weighed.right(left)
             if given is not None:
                 block, more = self.blocks[given], self._more(given, weighed)
                 level = level + taken(gram, here, block, more)
@@ -170,14 +171,16 @@ class Null:
 
     def likelihood_of(self, products: Products) -> FloatArray:
         """Return the largest log likelihood of k residuals over the sizes, (k,), [nats]."""
-        return np.asarray(np.max([level for level, _ in self._at(products)], axis=0))
+        return np.asarray(np.max([level for level, _, _ in self._at(products)], axis=0))
 
-    def _at(self, products: Products) -> Iterator[tuple[FloatArray, Weighed]]:
-        """Yield the log likelihood (k,) at every size, with the metric."""
+    def _at(self, products: Products) -> Iterator[tuple[FloatArray, Weighed, FloatArray]]:
+        """Yield the log likelihood (k,) at every size, the metric, and B r beside the means."""
         right, square = products
         for size, weighed in self._weighed:
-            rest = self.view.log_volume - 0.5 * square + size.log_prior
-            yield weighed.gain(right) + rest, weighed
+            mean, gram = weighed.normal.mean, self.view.normal.gram
+            left = right - (gram @ mean)[:, None]
+            rest = self.view.log_volume - 0.5 * (square - mean @ (right + left)) + size.log_prior
+            yield weighed.gain(left) + rest, weighed, left
 
     def _more(self, j: int, weighed: Weighed) -> FloatArray:
         """Return the variance of a block beyond that of plain tires."""
@@ -237,7 +240,8 @@ class Null:
 
     def explained(self) -> FloatArray:
         """Return coefficients of all rows by the hypothesis and what plain tires show, (m,)."""
-        return self.likeliest.mean(self.view.normal.right)
+        normal = self.likeliest.normal
+        return normal.mean + self.likeliest.mean(normal.right)
 
     def beside(self, name: str) -> tuple[FloatArray, FloatArray]:
         """Return what a further effect or more of a group takes, and its covariance.
@@ -248,18 +252,18 @@ class Null:
         block = self.blocks[j]
         inner = weighed.gram[block, block] + np.diag(1.0 / self._more(j, weighed))
         covariance = np.asarray(np.linalg.inv(inner), dtype=float)
-        return covariance @ weighed.right(self.view.normal.right)[block], covariance
+        return covariance @ weighed.right(weighed.normal.right)[block], covariance
 
     def moved(self, name: str) -> FloatArray:
         """Return how coefficients of all rows move, (m,), if a further effect is there.
 
         Those of the effect itself (or of more of a group) are from zero.
         """
-        weighed, right = self.likeliest, self.view.normal.right
+        weighed, right = self.likeliest, self.likeliest.normal.right
         block, spread = self.blocks[self.names.index(name)], weighed.root**2
         spread[block] += self._more(self.names.index(name), weighed)
         after, before = Weighed(self.view.normal, spread).mean(right), weighed.mean(right)
-        before[block] = 0.0
+        before[block] = -self.likeliest.normal.mean[block]
         return after - before
 
     def angle(self, one: str, other: str) -> float:

@@ -2,11 +2,11 @@
 
 A model is not a tire. What a fitted model leaves of a tire without any of the catalogue's effects
 looks to some extent like them, and to some extent like nothing known. Both are learned, from plain
-tires of families that share no code: for every family the variance of each effect's apparent
-strength, in ranges, and that of each group of smooth shapes (expectation and maximisation of the
-likelihood; Dempster, Laird and Rubin 1977). The tires themselves are kept as well, each as one draw
-of all coefficients from its posterior. Put into a user's plan they show how large a statistic gets
-where nothing is hidden.
+tires of families that share no code: for every family the mean and the variance of each effect's
+apparent strength, in ranges, and the variance of each group of smooth shapes (expectation and
+maximisation of the likelihood; Dempster, Laird and Rubin 1977). The tires themselves are kept as
+well, each as one draw of all coefficients from its posterior. Put into a user's plan they show how
+large a statistic gets where nothing is hidden.
 """
 
 import json
@@ -55,6 +55,9 @@ class Family:
         never more than `LARGEST`.
     least : mapping of block to variance
         What the tire may show at least (`covering`). Where it is empty, `spread` says it.
+    means : mapping of effect to float
+        What all tires of the family show of an effect of one number, in ranges; the squares are
+        about it.
     """
 
     name: str
@@ -64,6 +67,7 @@ class Family:
     squares: FloatArray
     largest: float = LARGEST
     least: Mapping[str, float] = field(default_factory=dict)
+    means: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.draws)
@@ -152,23 +156,33 @@ def learn(
             if block != BASE:
                 blocks.setdefault(block, where.stop - where.start)
     spread = dict.fromkeys(blocks, START)
+    means = {block: 0.0 for block, rows in blocks.items() if rows == 1}
     squares = np.zeros((len(tires), len(blocks)))
+    shown = np.full((len(tires), len(blocks)), np.nan)
     likeliest = [tire[0] for tire in tires]
     for _ in range(ROUNDS):
         known: dict[str, float | FloatArray] = {**spread, BASE: widths**2}
         for k, tire in enumerate(tires):
-            weighed = [Weighed(each.normal, each.normal.spread(known)) for each in tire]
-            at = [w.log_likelihood() + e.log_volume for w, e in zip(weighed, tire, strict=True)]
+            views = [replace(each, normal=each.normal.about(means)) for each in tire]
+            weighed = [Weighed(each.normal, each.normal.spread(known)) for each in views]
+            at = [w.log_likelihood() + e.log_volume for w, e in zip(weighed, views, strict=True)]
             best = int(np.argmax(at))
-            likeliest[k] = tire[best]
-            mean = weighed[best].mean(tire[best].normal.right)
+            likeliest[k] = views[best]
+            mean = weighed[best].mean(views[best].normal.right)
             square = mean**2 + np.diag(weighed[best].covariance)
             for j, block in enumerate(blocks):
-                rows = tire[best].normal.blocks.get(block)
+                rows = views[best].normal.blocks.get(block)
                 squares[k, j] = np.nan if rows is None else float(np.mean(square[rows]))
+                if rows is not None and block in means:
+                    shown[k, j] = means[block] + float(mean[rows][0])
         new = np.maximum(np.nanmean(squares, axis=0), TINY)
         old = np.array(list(spread.values()))
         spread = dict(zip(blocks, new.tolist(), strict=True))
+        means = {
+            block: float(np.nanmean(shown[:, j]))
+            for j, block in enumerate(blocks)
+            if block in means
+        }
         if float(np.abs(np.log(new / old)).max()) < SETTLED:
             break
     random = np.random.default_rng(0)
@@ -180,10 +194,10 @@ def learn(
         for block, size in blocks.items():
             rows = normal.blocks.get(block)
             if rows is not None:
-                draw[first : first + size] = drawn[rows]
+                draw[first : first + size] = drawn[rows] + means.get(block, 0.0)
             first += size
     own = float(np.median([each.own for each in likeliest]))
-    return Family(name, own, blocks, draws, squares, largest)
+    return Family(name, own, blocks, draws, squares, largest, means=means)
 
 
 def save(path: Path, families: Sequence[Family], provenance: Mapping[str, object]) -> None:
@@ -197,6 +211,7 @@ def save(path: Path, families: Sequence[Family], provenance: Mapping[str, object
             "own": family.own,
             "blocks": dict(family.blocks),
             "largest": family.largest,
+            "means": dict(family.means),
         }
     text = json.dumps({"families": about, "provenance": dict(provenance)}, indent=1)
     np.savez_compressed(path, about=np.array(text), **arrays)  # type: ignore[arg-type]
@@ -214,6 +229,7 @@ def load(path: Path) -> tuple[tuple[Family, ...], dict[str, object]]:
                 file[f"{name}/draws"].astype(float),
                 file[f"{name}/squares"].astype(float),
                 float(each.get("largest", LARGEST)),
+                means=dict(each.get("means", {})),
             )
             for name, each in about["families"].items()
         )
@@ -238,7 +254,10 @@ def pooled(families: Sequence[Family], sizes: Mapping[str, float]) -> dict[str, 
 
     The sizes are those of `Family.spread`.
     """
-    each = [family.spread(sizes) for family in families]
+    each = [
+        {k: v + family.means.get(k, 0.0) ** 2 for k, v in family.spread(sizes).items()}
+        for family in families
+    ]
     names = dict.fromkeys(name for spread in each for name in spread)
     return {
         name: float(np.mean([spread[name] for spread in each if name in spread])) for name in names

@@ -299,14 +299,18 @@ def select(
     if base.p > alpha:
         return done("none", ())
     leaders: list[Hypothesis] = [base]
+    # what an effect that states a start does at zero says nothing of what it does there
+    elsewhere = [name for name, effect in hypotheses.effects.items() if effect.start]
     for size in range(1, MOST + 1):
+        tried = [
+            (leader, _further(leader, hypotheses.effects, SINGLES if size == 1 else PARTNERS))
+            for leader in leaders
+        ]
         level = hypotheses.each(
             [
-                ((*hypotheses.added(leader), further), leader)
-                for leader in leaders
-                for further in _further(
-                    leader, hypotheses.effects, SINGLES if size == 1 else PARTNERS
-                )
+                ((*hypotheses.added(leader), name), leader)
+                for leader, further in tried
+                for name in dict.fromkeys(further + (elsewhere if size == 1 else []))
             ]
         )
         # two leaders may lead to one and the same set
