@@ -10,6 +10,7 @@ with strengths s of the model's effects and a of all others, sigma that of plain
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -61,7 +62,7 @@ Whiten = Callable[[FloatArray], FloatArray]
 """Turns rows (k, ...) into whitened ones (k, n)."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Posterior:
     """A fitted model, and everything that may explain what it leaves.
 
@@ -115,7 +116,7 @@ class Posterior:
         """Names of the model's effects."""
         return tuple(effect.name for effect in self.effects)
 
-    @property
+    @cached_property
     def sizes(self) -> dict[str, float]:
         """Mean squares of the rows of everything that plain tires may show, by block.
 

@@ -266,3 +266,16 @@ def test_effects_that_stand_out_are_tried_though_all_leave_the_same() -> None:
     assert _further(leader, effects, 1) == ["e"]
     assert {"d", "e"} <= set(_further(leader, effects, 3))
     assert set(_further(leader, effects, 9)) == set("abcde")
+
+
+@pytest.mark.parametrize(("start", "tried"), [((0.5,), True), ((), False)])
+def test_an_effect_that_states_a_start_is_tried_whatever_it_does_at_zero(
+    start: tuple[float, ...], tried: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One hypothesis of one effect is fitted, that which stands out; and this one."""
+    monkeypatch.setattr("tirelib.infer.select.SINGLES", 1)
+    toy = Toy(drawn(np.random.default_rng(8), swell=0.6))
+    toy.living = (*toy.living[:2], replace(toy.living[2], start=start))
+    found = select(toy, FAMILIES)
+    assert found.sets == (("swell",),)
+    assert (("twist",) in [h.names for h in found.tried]) is tried
