@@ -21,7 +21,7 @@ from tirelib.arrays import FloatArray, IntArray
 from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.null import Null
 from tirelib.infer.plain import View
-from tirelib.infer.posterior import coordinates_of, explaining
+from tirelib.infer.posterior import explaining
 from tirelib.infer.problem import Problem
 
 DRAWS = 48
@@ -126,7 +126,7 @@ class _Forecast:
         solved = ahead.solve(point)
         named, slopes = explaining(ahead, point, solved, rival.fit.count)
         self.rows = np.concatenate(list(named.values()))
-        away = solved.rest + np.tensordot(coordinates_of(point), slopes, axes=1)
+        away = solved.rest + np.tensordot(point.coordinates, slopes, axes=1)
         self.start = -away  # nothing is measured ahead: the residual is the negative model
 
     def drawn(self, count: int, seed: int) -> FloatArray:

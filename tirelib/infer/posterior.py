@@ -17,7 +17,8 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
-from tirelib.errors import ConvergenceError, TirelibError
+from tirelib.errors import ConvergenceError
+from tirelib.infer.downhill import Whiten, downhill
 from tirelib.infer.normal import LEAST, Normal, Weighed
 from tirelib.infer.plain import BASE, ROUGHLY, View
 from tirelib.infer.problem import Model, Point, Problem
@@ -40,17 +41,6 @@ FAR, LOOSE = 10.0, 0.03
 """A model that leaves more than `FAR` of what noise leaves is settled by steps that bring less than
 `LOOSE` of that surplus: it lacks something strong, and how near it comes to the runs without that
 decides nothing."""
-LEAST_FALL = 0.1
-"""Share of what a step promises that it has to bring, or a shorter one is tried."""
-GOOD = 0.5
-"""Share below which the next step is damped."""
-FIRST = 0.1
-"""Damping to begin with, relative to the curvature by each coordinate."""
-LONGEST = 1.0
-"""Longest move of a coordinate in one step."""
-HARDEST = 1e4
-"""Damping at which there is no way down."""
-
 NEAR, FOLLOWED = 1.0, 25
 """Move of a coordinate, in standard deviations, below which a whitening that follows the fit is
 kept, for it hardly changes any more; and steps after which it is kept in any case: following the
@@ -58,8 +48,6 @@ solution, a fit may go in circles."""
 
 Spread = Mapping[str, float]
 """Variances of what plain tires show, by block."""
-Whiten = Callable[[FloatArray], FloatArray]
-"""Turns rows (k, ...) into whitened ones (k, n)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,14 +219,14 @@ def posterior(
             whiten = follow(solved)
             whitened, rest = _white(whiten, problem.remainder(point, solved)), whiten(solved.rest)
         rows = {BASE: whiten(slopes), **whitened}
-        here = Quadratic.about(rows, rest, coordinates_of(point), width, spread, ends)
+        here = Quadratic.about(rows, rest, point.coordinates, width, spread, ends)
         dz, cost = here.step(), here.cost
         promised = here.fall(dz)
         unit = max(1.0, cost / rest.size)
         little = settled * unit
         there = promised < little
         there = there and bool((np.abs(dz[asked]) < STILL * here.deviation[asked]).all())
-        lower = None if there else _downhill(problem, here, point, solved, whiten, damping)
+        lower = None if there else downhill(problem, here, point, solved, whiten, damping)
         if lower is None:
             # the bottom, or its edge: slopes of a point nearby do not tell
             if exact:
@@ -265,7 +253,7 @@ def posterior(
         )
     every, slopes = explaining(problem, point, solved, len(effects))
     count = len(every[BASE])
-    rest_from_start = solved.rest + np.tensordot(coordinates_of(point), slopes, axes=1)
+    rest_from_start = solved.rest + np.tensordot(point.coordinates, slopes, axes=1)
     normal = Normal.of(every, solved.rest, whiten)
     metric = Weighed(normal, normal.spread(spread))
     block = normal.blocks[BASE]
@@ -348,11 +336,6 @@ def _start(
     return Point(start.base, tuple(every), tuple(np.array(s, dtype=float) for s in given))
 
 
-def coordinates_of(point: Point) -> FloatArray:
-    """Return the base's coordinates and the strengths in ranges, (n_coordinates,)."""
-    return np.concatenate([point.base, *point.ranges])
-
-
 def _widths(
     problem: Model, effects: Sequence[Effect], others: Sequence[Effect], spread: Spread
 ) -> FloatArray:
@@ -376,50 +359,3 @@ def _ends(problem: Model, effects: Sequence[Effect], others: Sequence[Effect]) -
 def _model(effects: Sequence[Effect]) -> str:
     names = " and ".join(effect.name for effect in effects)
     return f"the model with {names}" if names else "the base model"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Lower:
-    """A point with a lower cost: whitened residual, longest move in deviations, next damping."""
-
-    point: Point
-    solved: Any
-    rest: FloatArray
-    cost: float
-    moved: float
-    damping: float
-
-
-def _downhill(
-    problem: Model, here: Quadratic, point: Point, solved: Any, whiten: Whiten, damping: float
-) -> _Lower | None:
-    """Return a point whose cost is lower as promised, by ever shorter steps; None if none is."""
-    while damping < HARDEST:
-        dz = here.step(damping)
-        share = min(1.0, LONGEST / float(np.abs(dz).max()))
-        tried = _tried(problem, point, share * dz, solved)
-        if tried is not None:
-            rest = whiten(tried[1].rest)
-            cost = here.cost_at(coordinates_of(tried[0]), rest)
-            brought = (here.cost - cost) / (share * here.fall(dz))
-            if brought > LEAST_FALL:
-                moved = share * float(np.abs(dz / here.deviation).max())
-                after = max(damping, FIRST) if brought < GOOD else 0.1 * damping
-                return _Lower(*tried, rest, cost, moved, after)
-        damping = max(10.0 * damping, FIRST)
-    return None
-
-
-def _tried(problem: Model, point: Point, dz: FloatArray, solved: Any) -> tuple[Point, Any] | None:
-    """Return the model a step away; None where it has no solution."""
-    k = len(point.base)
-    cuts = np.cumsum([e.components for e in point.effects])[:-1]
-    steps = np.split(dz[k:], cuts) if point.effects else []
-    strengths = tuple(
-        s + e.scale * d for s, e, d in zip(point.strengths, point.effects, steps, strict=True)
-    )
-    there = Point(point.base + dz[:k], point.effects, strengths)
-    try:
-        return there, problem.solve(there, solved)
-    except TirelibError:
-        return None

@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
+
 from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
 
@@ -35,6 +37,11 @@ class Point:
     def ranges(self) -> list[FloatArray]:
         """Strengths in ranges, of shape (components,) each."""
         return [s / e.scale for e, s in zip(self.effects, self.strengths, strict=True)]
+
+    @property
+    def coordinates(self) -> FloatArray:
+        """The base's coordinates and the strengths in ranges, (n_coordinates,)."""
+        return np.concatenate([self.base, *self.ranges])
 
 
 FOLLOWED = 0.003

@@ -14,7 +14,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.infer.hypothesis import Hypothesis, law_errors, plain_tires, products
 from tirelib.infer.plain import BASE, Family
-from tirelib.infer.posterior import Posterior, coordinates_of
+from tirelib.infer.posterior import Posterior
 from tirelib.infer.problem import Problem
 
 
@@ -50,4 +50,4 @@ def _likelihood(
 
 def _coordinates(fit: Posterior) -> FloatArray:
     """Return the coordinates of the base and of the model's effects."""
-    return coordinates_of(fit.point)[: len(fit.rows[BASE])]
+    return fit.point.coordinates[: len(fit.rows[BASE])]
