@@ -184,7 +184,7 @@ def write_step(
 
 
 def _say(document: dict[str, Any]) -> None:
-    from tirelib.report.explanation import unmoved
+    from tirelib.report.error_sentences import unmoved
     from tirelib.report.page import unit_name
 
     console = output()

@@ -360,6 +360,6 @@ def _held_out(added: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def _unmoved(added: list[dict[str, Any]]) -> list[str]:
     """Say of each step what did not fall on what was held out."""
-    from tirelib.report.explanation import unmoved
+    from tirelib.report.error_sentences import unmoved
 
     return [f"{step['effect']}: {said}" for step in added for said in unmoved(step)]

@@ -10,7 +10,8 @@ import plotly.graph_objects as go
 from tirelib.diagnose.document import Assessment
 from tirelib.diagnose.forces.assess import ForceAssessment
 from tirelib.report.comparison import BRUSH, METHOD, RING
-from tirelib.report.explanation import fold_name, titled
+from tirelib.report.error_sentences import fold_name
+from tirelib.report.explanation import titled
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.figures.force_left import force_maps
 from tirelib.report.figures.strain_left import strain_maps

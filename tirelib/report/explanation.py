@@ -8,13 +8,14 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any
 
 import numpy as np
 
 from tirelib.diagnose.told import listed
 from tirelib.infer.plain import ROUGHLY
-from tirelib.report.page import number, unit_name
+from tirelib.report.error_sentences import error_line, is_known, said_error
+from tirelib.report.page import number
 
 TITLES = {
     "missing": "What is missing",
@@ -23,8 +24,6 @@ TITLES = {
     "next": "What to do next",
 }
 """Title of each line, by its key in a document's `explanation`."""
-SENSE = 3
-"""Significant digits of an error in a sentence."""
 SHOWN = 3
 """Other effects that a sentence lists by name."""
 
@@ -82,8 +81,10 @@ def _missing(told: Mapping[str, Any]) -> str:
     if verdict == "none" and told["error_unit"] != "noise":
         return "This is not known: without the noise of repeated runs no effect can be tested."
     if verdict == "none":
+        once = ", once its own numbers are fitted to them" if _misfitted(told) else ""
         return (
-            "Nothing: these measurements need no effect of the catalogue in addition to the model."
+            "Nothing: these measurements need no effect of the catalogue in addition to the "
+            f"model{once}."
         )
     if verdict == "unknown":
         where = told["unexplained"].get("where")
@@ -205,42 +206,6 @@ def _blind(told: Mapping[str, Any]) -> list[str]:
     return [f"This plan cannot show {len(dead)} effects at all ({_some(dead)})."]
 
 
-def error_line(told: Mapping[str, Any]) -> str:
-    """Return the error before and after, and that of the held-out data.
-
-    Parameters
-    ----------
-    told : mapping
-        ``tirelib-diagnosis/1`` or ``tirelib-extension/1``.
-    """
-    unit = "times the noise" if told["error_unit"] == "noise" else unit_name(told["error_unit"])
-    before, after = told["error_before"], told["error_after"]
-    raw = f"{unit_name(told['residual_rms_unit'])} rms"
-    raw += ", errors of the set points included" if told["quantity"] == "strain" else ""
-    left = [number(told[f"residual_rms_{when}"], SENSE) for when in ("before", "after")]
-    again = told.get("error_refitted")
-    anew = "" if not _known(again) or _said(again) == _said(before) else _said(again)
-    own = "the model's own numbers fitted anew"
-    noise = told["error_unit"] == "noise"
-    if not (told.get("named") or told.get("action")):
-        rms = f" ({left[0]} {raw})" if noise else ""
-        also = f", {anew} with {own}" if anew else ""
-        return f"It is {_said(before)} {unit}{rms}{also}.{_floor(told, after)}"
-    several = len(told.get("named", ())) > 1 and told.get("verdict") != "indistinguishable"
-    it = "them" if several else "it"
-    ways = ["with", "without"] if told.get("action") == "remove" else ["without", "with"]
-    parted = after < before and told["residual_rms_after"] > told["residual_rms_before"]
-    rms = f" ({left[0]} to {left[1]} {raw})" if noise and not parted else ""
-    said = f"It {_moves(before, after)} {unit} {ways[1]} {it}{rms}.{_floor(told, after)}"
-    if parted:
-        said += (
-            f" The rms that includes the errors of the set points rose from {left[0]} to {left[1]} "
-            f"{unit_name(told['residual_rms_unit'])}."
-        )
-    said += f" {held_out_line(told)}"
-    return f"{said} {ways[0].title()} {it}, {own} leave {anew}." if anew else said
-
-
 def journey_explained(
     told: Mapping[str, Any], journey: Mapping[str, Any], folder: Path, out: Path
 ) -> dict[str, str]:
@@ -266,73 +231,6 @@ def journey_explained(
     return lines
 
 
-def unmoved(told: Mapping[str, Any]) -> list[str]:
-    """Return sentences on held-out errors that did not fall.
-
-    Parameters
-    ----------
-    told : mapping
-        ``tirelib-diagnosis/1``, ``tirelib-extension/1`` or ``tirelib-explanation/1``.
-    """
-    before, after = told["heldout_error_before"], told["heldout_error_after"]
-    pairs = [(f"The error of the {_what(told)} held out", before, after)]
-    folds = told["held_out"] if len(told["held_out"]) > 1 else ()
-    pairs += [
-        (f"The error with {fold_name(fold)} held out", fold["error_before"], fold["error_after"])
-        for fold in folds
-    ]
-    return [
-        f"{what} did not fall: {_said(old)} before, {_said(new)} after."
-        for what, old, new in pairs
-        if _known(old) and _known(new) and not _fell(old, new)
-    ]
-
-
-def held_out_line(told: Mapping[str, Any]) -> str:
-    """Return whether the held-out errors fell, and name those that did not."""
-    before, after = told.get("heldout_error_before"), told.get("heldout_error_after")
-    if not _known(before) or not _known(after):
-        return "Nothing could be held out of the fit to check it."
-    if _fell(before, after):
-        fell = f"On what was held out of the fit it {_moves(before, after)}."
-        return " ".join([fell, *unmoved(told)])
-    return " ".join(unmoved(told))
-
-
-def fold_name(fold: Mapping[str, Any]) -> str:
-    """Return the name of a held-out part."""
-    names = {
-        "time": f"part {fold['value']:.0f} of the time",
-        "cell": f"part {fold['value']:.0f} of the conditions",
-    }
-    size = f"{fold['runs']} runs" if "runs" in fold else f"{fold['points']} points"
-    usual = f"the {fold['condition']} {number(fold['value'], 4)} {fold['unit']}"
-    return f"{names.get(fold['condition'], usual)} ({size})"
-
-
-def _fell(before: float, after: float) -> bool:
-    """Whether an error fell by what a reader of the sentence can see."""
-    return after < before and _said(after) != _said(before)
-
-
-def _moves(before: float, after: float) -> str:
-    """Return in words how an error changes."""
-    if _said(before) == _said(after):
-        return f"stays at {_said(after)}"
-    return f"{'falls' if after < before else 'rises'} from {_said(before)} to {_said(after)}"
-
-
-def _floor(told: Mapping[str, Any], after: float) -> str:
-    floor = told.get("floor")
-    if not _known(floor):
-        return ""
-    if _said(floor) == _said(after):
-        if told.get("verdict") in ("unknown", "form_inadequate"):
-            return " Noise and the structure of a tire can be as large, but not of this shape."
-        return " All that is left is noise and the structure of a tire."
-    return f" Noise and the structure of a tire explain {_said(floor)} of what is left."
-
-
 def _next(told: Mapping[str, Any], given: Sequence[str]) -> str:
     if told["verdict"] in ("named", "form_inadequate"):
         option = () if told["quantity"] == "strain" else ("--quantity", told["quantity"])
@@ -342,9 +240,24 @@ def _next(told: Mapping[str, Any], given: Sequence[str]) -> str:
             "then diagnose again with the new model."
         )
     what = str(told["next_test"]["what"]).rstrip(".")
+    if told["verdict"] == "none" and _misfitted(told):
+        as_it_is, anew = said_error(told["error_before"]), said_error(told["error_refitted"])
+        return (
+            "Fit the model to these measurements with tirelib identify: as it is, its error is "
+            f"{as_it_is} times the noise, and {anew} with its numbers fitted anew."
+        )
     if told["verdict"] == "none" and told["error_unit"] == "noise":
         return "No further run is needed for the effects that this plan can show."
     return f"{what[0].upper()}{what[1:]}."
+
+
+def _misfitted(told: Mapping[str, Any]) -> bool:
+    """Whether the model's numbers are not those of this tire: fitted anew they leave half or less.
+
+    A factor of two is no threshold of a verdict; it decides what is advised.
+    """
+    again = told.get("error_refitted")
+    return is_known(again) and 2.0 * again < told["error_before"]
 
 
 def _candidate(told: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
@@ -377,16 +290,3 @@ def _some(names: Sequence[str]) -> str:
     listed = list(dict.fromkeys(names))
     more = f" and {len(listed) - SHOWN} more" if len(listed) > SHOWN else ""
     return ", ".join(listed[:SHOWN]) + more
-
-
-def _what(told: Mapping[str, Any]) -> str:
-    return "points" if told["quantity"] != "strain" else "runs"
-
-
-def _said(value: float) -> str:
-    """Return an error with the digits that sentences use: 30, 6.7, 0.48."""
-    return number(value, SENSE if abs(value) >= 10.0 else 2)
-
-
-def _known(value: Any) -> TypeGuard[float]:
-    return isinstance(value, int | float) and bool(np.isfinite(value))

@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tirelib.report.explanation import error_line, fold_name, said_strength
+from tirelib.report.error_sentences import error_line, fold_name
+from tirelib.report.explanation import said_strength
 from tirelib.report.figures.before_after import part_errors, run_errors
 from tirelib.report.figures.waterfall import waterfall_of
 from tirelib.report.page import Table, number, unit_name

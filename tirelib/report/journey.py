@@ -7,7 +7,8 @@ from typing import Any
 
 from tirelib.compare.forces import ForceComparison
 from tirelib.compare.strain import Comparison
-from tirelib.report.explanation import fold_name, titled
+from tirelib.report.error_sentences import fold_name
+from tirelib.report.explanation import titled
 from tirelib.report.figures.before_after import (
     force_curves,
     force_maps,

@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from tirelib.report.explanation import error_line, explained, held_out_line, unmoved
+from tirelib.report.error_sentences import error_line, held_out_line, unmoved
+from tirelib.report.explanation import explained
 
 
 def candidate(effect: str, **changes: Any) -> dict[str, Any]:
@@ -263,3 +264,26 @@ def test_without_a_name_one_error_is_told() -> None:
     assert odd.error.endswith(
         "Noise and the structure of a tire can be as large, but not of this shape."
     )
+
+
+def test_numbers_that_cover_for_a_missing_effect_are_told_by_what_was_held_out() -> None:
+    """Fitted anew without the effect they may leave less on their own runs, and fail on others."""
+    line = error_line(diagnosis(error_refitted=7.1))
+    assert line.endswith(
+        "Without it, the model's own numbers fitted anew leave 7.1 on the runs that they are fitted "
+        "to: less, but 25.9 on those held out. Numbers that cover for a missing effect fit, and do "
+        "not predict."
+    )
+    not_held_out = {"heldout_error_before": None, "heldout_error_after": None}
+    line = error_line(diagnosis(error_refitted=7.1, **not_held_out))
+    assert line.endswith("to: less, but of a shape that plain tires do not show.")
+
+
+@pytest.mark.parametrize(("refitted", "advised"), [(4.5, True), (50.0, False)])
+def test_a_model_that_is_not_fitted_to_the_measurements_is_not_said_to_lack_nothing(
+    refitted: float, advised: bool
+) -> None:
+    plain = diagnosis(verdict="none", named=[], sets=[], error_before=71.6, error_after=refitted)
+    told = explained(plain | {"error_refitted": refitted, "p": 0.4}, "M.toml", "DIR")
+    assert ("once its own numbers are fitted to them" in told.missing) is advised
+    assert told.next.startswith("Fit the model to these measurements") is advised

@@ -11,7 +11,7 @@ from tirelib.compare.force_curves import Curve, curves_of, ranked, slip_of
 from tirelib.compare.forces import UNITS, ForceComparison
 from tirelib.compare.strain import Comparison
 from tirelib.quantities import QUANTITIES
-from tirelib.report.explanation import fold_name
+from tirelib.report.error_sentences import fold_name
 from tirelib.report.figures.compare_forces import force_plots
 from tirelib.report.figures.compare_heat import DEGREES, heat_maps
 from tirelib.report.figures.compare_plot import (
