@@ -43,7 +43,7 @@ REMEDIES = {
     "CUT_OFF": "Leave out `--cut-off`, or raise the sample rate of the gages.",
     "REDUCED_GAGES": "Repair the gage; until then intervals are those without it.",
     "TOO_FEW_GAGES": "Repair the gages: the centre gage and all but one of the others are needed.",
-    "NO_CONDITION": "Give pressure and camber: the calibration varied them.",
+    "NO_CONDITION": "Give pressure, camber and speed: the calibration varied what is missing.",
     "WEAK_EDGE": "Look at the load: at very low loads the contact has no clear edges.",
     "NO_CONTACT": "The wheel stands, or the gages are dead or frozen.",
     "FAULT": "Read the log, and report it: this is an error of the estimator.",

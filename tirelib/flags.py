@@ -41,7 +41,7 @@ class TurnFlag(IntFlag):
     TOO_FEW_GAGES = 16384
     """The centre gage, or more than one gage, is out: no estimate."""
     NO_CONDITION = 32768
-    """A condition that the calibration needs (pressure, camber) is unknown."""
+    """A condition that the calibration needs (pressure, camber, speed) is unknown."""
     WEAK_EDGE = 65536
     """A peak lies at the border of its search range: the edge is not distinct."""
     NO_CONTACT = 131072
