@@ -198,6 +198,13 @@ def _say(document: dict[str, Any]) -> None:
         f"  error {document['error_before']:.3g} -> {document['error_after']:.3g} [{unit}], "
         f"floor {document['floor']:.3g}"
     )
+    for name, errors in document.get("others", {}).items():
+        before, after = errors["error_before"], errors["error_after"]
+        worse = "; it rises, because the same brush was fitted to another force"
+        console.print(
+            f"  error of {name} {before:.3g} -> {after:.3g} [{unit_name(errors['error_unit'])}]"
+            f"{worse if after > before else ''}"
+        )
     for fold in document["held_out"]:
         console.print(
             f"  {_left_out(fold)} left out: error {fold['error_before']:.3g} -> "

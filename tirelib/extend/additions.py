@@ -16,7 +16,7 @@ from tirelib.compare.model import Model, model_of
 from tirelib.diagnose.document import Assessment
 from tirelib.diagnose.forces.assess import ForceAssessment, force_cases
 from tirelib.effects import Effect
-from tirelib.errors import ParameterError, TirelibError
+from tirelib.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.extend.document import extension_document
 from tirelib.extend.extension import (
     Extension,
@@ -37,6 +37,7 @@ from tirelib.extend.force_extension import (
 from tirelib.extend.model_file import extended_file
 from tirelib.extend.step import Step
 from tirelib.identify.campaign_data import straight_runs
+from tirelib.identify.force_data import FORCES
 from tirelib.parameters import TireFile
 from tirelib.waveforms import measure_waveforms
 
@@ -87,18 +88,19 @@ def additions(
     names = [effect.name for effect in effects]
     if len(set(names)) < len(names):
         raise ParameterError(f"effects {', '.join(names)}: one is named twice; leave it out")
+    written = _brush(campaign, catalogue)
     if isinstance(diagnosis, ForceAssessment):
         _belongs(
             diagnosis.case.name, diagnosis.case.model, campaign, force_model_of(file, catalogue)
         )
         case, brush = diagnosis.case, diagnosis.diagnosis.models
-        return _chain(effects, file, partial(extended_brush, brush, case), _brush(campaign), failed)
+        return _chain(effects, file, partial(extended_brush, brush, case), written, failed)
     if diagnosis is None and acts_on_forces(effects[0], quantity):
         case = case_for(force_cases(campaign, file, catalogue, quantity), effects[0])
         for effect in effects:
             refuse_brush(case, effect)
         brush = force_models(case, effects, progress)
-        return _chain(effects, file, partial(extended_brush, brush, case), _brush(campaign), failed)
+        return _chain(effects, file, partial(extended_brush, brush, case), written, failed)
     model = model_of(file, catalogue)
     for effect in effects:
         refuse(model, effect)
@@ -129,7 +131,8 @@ def removal(
     """
     if acts_on_forces(effect, quantity):
         case = case_for(force_cases(campaign, file, catalogue, quantity), effect)
-        return _brush(campaign)(file, remove_brush_effect(case, effect, progress=progress))
+        removed = remove_brush_effect(case, effect, progress=progress)
+        return _brush(campaign, catalogue)(file, removed)
     runs = straight_runs(measure_waveforms(campaign, progress=progress))
     step = remove_effect(runs, model_of(file, catalogue), effect, progress=progress)
     return _strain(campaign)(file, step)
@@ -163,12 +166,31 @@ def _strain(campaign: Campaign) -> Callable[[TireFile, Extension], Extended]:
     return written
 
 
-def _brush(campaign: Campaign) -> Callable[[TireFile, ForceExtension], Extended]:
+def _brush(
+    campaign: Campaign, catalogue: Mapping[str, Effect]
+) -> Callable[[TireFile, ForceExtension], Extended]:
     def written(file: TireFile, step: ForceExtension) -> Extended:
         new = force_extended_file(file, step, campaign.content_hash())
-        return new, force_extension_document(step, new)
+        others = _others(campaign, (file, new), catalogue, step.case.quantity)
+        return new, force_extension_document(step, new) | {"others": others}
 
     return written
+
+
+def _others(
+    campaign: Campaign, files: Sequence[TireFile], catalogue: Mapping[str, Effect], fitted: str
+) -> dict[str, dict[str, Any]]:
+    """Return the errors of the forces that were not fitted, before and after: one brush has all."""
+    told = {}
+    for name in FORCES:
+        if name == fitted:
+            continue
+        try:
+            (old,), (new,) = (force_cases(campaign, each, catalogue, name) for each in files)
+        except CalibrationError:
+            continue
+        told[name] = {"error_before": old.given, "error_after": new.given, "error_unit": new.unit}
+    return told
 
 
 def _chain(

@@ -166,8 +166,7 @@ def _model(model: Model, quantity: str) -> dict[str, Any]:
         "ready": model.ready,
         "fit": fit,
         "advice": _part(model.place / "fit.json", _ADVISES, advice),
-        "error": compared.get("error"),
-        "error_unit": compared.get("error_unit"),
+        **_error(compared, fit, model.told["quantity"], quantity),
         "effects": compared.get("effects", []),
         "verdict": diagnosis.get("verdict"),
         "named": diagnosis.get("named", []),
@@ -183,11 +182,21 @@ def _model(model: Model, quantity: str) -> dict[str, Any]:
     }
 
 
+def _error(
+    compared: Mapping[str, Any], fit: Mapping[str, Any], fitted: str, quantity: str
+) -> dict[str, Any]:
+    """Return the error of a quantity: as the model was compared with it, else as a fit tells it."""
+    other = (fit.get("others") or fit.get("force_errors") or {}).get(quantity) or {}
+    told = compared or (fit if fitted == quantity else other)
+    error = told.get("error", told.get("error_after"))
+    return {"error": error, "error_unit": told.get("error_unit")}
+
+
 _FIT = (
     *("effect", "action", "title", "strength", "std", "unit", "range", "in_range", "flags"),
     *("error_before", "error_after", "error_unit", "error_refitted", "floor"),
     *("heldout_error_before", "heldout_error_after", "held_out", "messages", "quantity"),
-    *("error", "force_errors"),
+    *("error", "force_errors", "others"),
     *("residual_rms_before", "residual_rms_after", "residual_rms_unit"),
 )
 _ADVISES = ("messages", "reasons", "parameters", "brush")

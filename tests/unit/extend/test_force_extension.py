@@ -20,6 +20,7 @@ from tirelib.extend.force_extension import (
     remove_brush_effect,
 )
 from tirelib.extend.model_file import undone_file
+from tirelib.journey import add
 from tirelib.parameters import TireFile, read_tire, write_tire
 from tirelib.report.figures.waterfall import waterfall_of
 
@@ -64,6 +65,21 @@ def test_the_error_falls_to_the_noise_fitted_and_on_the_highest_load(
     assert (fold.name, fold.main) == ("load", True)
     # the laws are carried on by half of the highest load that was fitted
     assert added.held_after[0] < 2.0 * case.noise < 0.2 * added.held_before[0]
+
+
+def test_a_step_tells_the_error_of_a_force_that_was_not_fitted(
+    model: TireFile, tmp_path: Path
+) -> None:
+    runs = (
+        replace(run, rig=run.rig | {"Mz": -0.03 * run.rig["Fy"]})
+        for run in steady_runs(slope=SLOPE)
+    )
+    campaign = write_forces(tmp_path / "both", runs, "both")
+    new, document = add(EFFECT.name, model, campaign, "Fy")
+    before, after = (force_case(campaign, file, CATALOGUE, "Mz") for file in (model, new))
+    told = {"error_before": before.given, "error_after": after.given, "error_unit": after.unit}
+    assert document["others"] == {"Mz": told}
+    assert before.given != after.given
 
 
 def test_the_file_holds_what_was_fitted_and_comes_back(

@@ -14,6 +14,7 @@ from tirelib.studio.desk import Desk
 from tirelib.studio.jobs import AT_ONCE, Jobs, Progress
 from tirelib.studio.session import Session
 from tirelib.studio.starter import Starter
+from tirelib.studio.state import _error
 
 
 def alive(pid: int) -> bool:
@@ -120,6 +121,18 @@ def test_a_fault_of_the_program_itself_is_told_without_its_traceback(tmp_path: P
     assert job.message.startswith("tirelib has a fault of its own here (ValueError: no such run).")
     assert "Traceback" not in job.message
     assert str(jobs.place(job) / "stderr.txt") in job.message
+
+
+def test_each_quantity_has_its_own_error_of_a_model() -> None:
+    others = {"Fy": {"error_before": 4.7, "error_after": 71.6, "error_unit": "noise"}}
+    added = {"error_after": 8.6, "error_unit": "Nm", "others": others}
+    assert _error({}, added, "Mz", "Mz") == {"error": 8.6, "error_unit": "Nm"}
+    assert _error({}, added, "Mz", "Fy") == {"error": 71.6, "error_unit": "noise"}
+    assert _error({}, added, "Mz", "Fx") == {"error": None, "error_unit": None}
+    compared = {"error": 71.5, "error_unit": "noise"}
+    assert _error(compared, added, "Mz", "Fy") == compared
+    base = {"error": 15.2, "force_errors": {"Fy": {"error": 3.0, "error_unit": "noise"}}}
+    assert _error({}, base, "", "Fy") == {"error": 3.0, "error_unit": "noise"}
 
 
 def test_two_ticked_effects_are_added_one_after_the_other_and_undo_goes_back(

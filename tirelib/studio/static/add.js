@@ -1,6 +1,6 @@
 // Step 4: the refit while it runs, the fall of the error, and every model that was made.
 import { compareModels } from "./compare.js";
-import { app, current, failedOf, heldOutOf, nameOf, pathOf, plain, progressOf, stepOf, verdictOf, wish } from "./data.js";
+import { app, current, failedOf, fitOf, heldOutOf, nameOf, pathOf, plain, progressOf, stepOf, verdictOf, wish } from "./data.js";
 import { csvButton, fill, h, number, strength, unitName } from "./dom.js";
 import { Plot, waterfall } from "./plots.js";
 
@@ -23,6 +23,8 @@ function ahead(model) {
   if (model.verdict === "none") return ["Nothing more is to be added: ", link("take", "take the model away"), " (step 5), or ", link("suspect", "tick any effect in step 3"), " to see what it does to the error."];
   return [plain(Object.fromEntries(model.lines).next || "", model), " ", link("suspect", "Step 3 shows the suspects"), "."];
 }
+
+const unitOf = (told) => ` [${unitName(told.error_unit)}]`;
 
 // What was held out, part by part.
 const partOf = ({ condition, value, unit }) => ({ time: `part ${value} of the time`, cell: `part ${value} of the conditions` })[condition] || `${condition.replaceAll("_", " ")} ${number(value, 3)} ${unit || ""}`;
@@ -68,15 +70,16 @@ export class Add {
 
   steps(c, model) {
     return pathOf(c, model).map((one, i, all) => ({
-      name: i ? `${one.action === "remove" ? "− " : "+ "}${one.effect}` : "base model", note: one.fit?.strength !== undefined && one.fit.strength !== null ? strength(one.fit.strength, 3) : "",
-      error: i ? one.fit?.error_after ?? one.error : one.error ?? all[1]?.fit?.error_before ?? null,
+      name: i ? `${one.action === "remove" ? "− " : "+ "}${one.effect}` : "base model", note: one.parent && one.quantity !== c.quantity ? `fitted to ${one.quantity}` : one.fit?.strength === undefined || one.fit.strength === null ? "" : strength(one.fit.strength, 3),
+      error: one.error ?? (all[i + 1] && fitOf(c, all[i + 1])?.error_before) ?? null,
       heldout: heldOutOf(c, one),
-      floor: one.fit?.floor ?? null,
+      floor: fitOf(c, one)?.floor ?? null,
+      anew: one.action === "add" ? fitOf(c, one)?.error_refitted ?? null : null,
     }));
   }
 
   history(c) {
-    const now = current(), unit = unitName(now?.error_unit || now?.fit?.error_unit);
+    const now = current(), unit = unitName(now?.error_unit);
     const failed = c.jobs.filter((job) => ["add", "remove"].includes(job.kind) && ["failed", "cancelled", "interrupted"].includes(job.state)).slice(-3);
     const key = JSON.stringify([c.models, c.current, failed.map((j) => j.job), failedOf("compare")?.job, failedOf("diagnose")?.job, this.hidden, c.quantity]);
     if (key === this.key) return;
@@ -84,9 +87,10 @@ export class Add {
     const steps = now ? this.steps(c, now) : [];
     const last = now?.fit && now.parent ? now.fit : null;
     fill(this.fall, h("div", { class: "row" }, h("h2", {}, "The fall of the error"), h("span", { class: "quiet" }, c.quantity), h("span", { class: "room" }),
-      csvButton("waterfall", () => [["step", steps.map((s) => s.name)], [`error [${unit}]`, steps.map((s) => s.error)], ["held-out error", steps.map((s) => s.heldout)], ["floor", steps.map((s) => s.floor)]])),
+      csvButton("waterfall", () => [["step", steps.map((s) => s.name)], [`error [${unit}]`, steps.map((s) => s.error)], ["held-out error", steps.map((s) => s.heldout)], ["floor", steps.map((s) => s.floor)], ["numbers fitted anew without the effect", steps.map((s) => s.anew)]])),
     steps.length ? waterfall(steps, unit) : h("p", { class: "quiet" }, "There is no model yet."),
-    last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(last.std, 2)}${last.unit === "1" ? "" : ` ${unitName(last.unit)}`}. Error ${number(last.error_before, 4)} before, `, h("b", { id: "error-after" }, number(last.error_after, 4)), ` after [${unitName(last.error_unit)}]. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after.`) : null,
+    last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(last.std, 2)}${last.unit === "1" ? "" : ` ${unitName(last.unit)}`}. Error of ${last.quantity}${unitOf(last)}: ${number(last.error_before, 4)} before, ${last.action === "add" ? `${number(last.error_refitted, 4)} with the numbers fitted anew without the effect, ` : ""}`, h("b", { id: "error-after" }, number(last.error_after, 4)), ` ${last.action === "add" ? "with it" : "without it"}. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after.`) : null,
+    Object.entries(last?.others || {}).map(([name, one]) => h("p", one.error_after > one.error_before ? { class: "warn" } : {}, `Error of ${name}${unitOf(one)}: ${number(one.error_before, 4)} before, ${number(one.error_after, 4)} after${one.error_after > one.error_before ? `. It rises, because the same brush was fitted to ${last.quantity}: go on from the model before where ${name} matters` : ""}.`)),
     last?.held_out?.length ? heldOut(last) : null,
     last?.flags?.length ? h("p", { class: "warn" }, last.flags.map((flag) => FLAGS[flag] || flag.replaceAll("_", " ")).join(" ")) : null,
     now?.verdict ? h("p", {}, "The verdict with this model: ", h("b", {}, verdictOf(now.verdict, now.error_unit, now.named)), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", ...ahead(now)) : now ? noVerdict(c) : null,
@@ -105,7 +109,7 @@ export class Add {
     const before = c.models.find((one) => one.number === m.parent);
     return h("div", { class: `model${m.number === c.current ? " current" : ""}${m.hidden ? " hidden-model" : ""}`, "data-model": m.number },
       h("div", { class: "name" }, nameOf(m), m.pinned ? [" ", h("span", { class: "tag" }, "pinned")] : null), h("div", { class: "small quiet" }, before ? `made of: ${nameOf(before)}` : "the start"),
-      h("div", {}, `error ${number(m.error ?? m.fit?.error_after)} `, h("span", { class: "quiet" }, unitName(m.error_unit || m.fit?.error_unit))), name,
+      h("div", {}, `error of ${c.quantity} ${number(m.error)} `, h("span", { class: "quiet" }, unitName(m.error_unit))), name,
       h("div", { class: "row" }, m.number === c.current ? h("span", { class: "tag" }, "shown") : h("button", { class: "small", type: "button", onclick: () => this.look(m) }, "Continue from here"),
         h("button", { class: "small", type: "button", onclick: () => mark({ pinned: !m.pinned }) }, m.pinned ? "Unpin" : "Pin"), h("button", { class: "small", type: "button", onclick: () => mark({ hidden: !m.hidden }) }, m.hidden ? "Show" : "Hide")));
   }

@@ -18,11 +18,11 @@ function mapOf(data, limit) {
 }
 
 const LINES = [
-  ["error", (t, m) => (t || m.fit?.error_after) && `${number(t?.error ?? m.fit.error_after, 4)} ${unitName((t || m.fit).error_unit)}`],
+  ["error", (_, m) => Number.isFinite(m.error) && `${number(m.error, 4)} ${unitName(m.error_unit)}`],
   [RMS_LEFT, (t) => t && `${number(t.residual_rms_raw)} ${rmsOf(t)}`],
   ["effects", (t) => t && (t.effects.map((e) => `${e.effect} ${strength(e.strength)}`).join("; ") || "none")],
   ["verdict", (_, m) => verdictOf(m.verdict, m.error_unit, m.named)],
-  ["held-out error", (t, m, c) => { const error = heldOutOf(c, m); return error && `${number(error, 4)} ${unitName((t || m.fit).error_unit)}`; }],
+  ["held-out error", (_, m, c) => { const error = heldOutOf(c, m); return error && `${number(error, 4)} ${unitName(m.error_unit)}`; }],
 ];
 
 // Rows of the table of runs (forces: curves): name, error of the left model, of the right one.

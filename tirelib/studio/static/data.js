@@ -95,8 +95,11 @@ export function pathOf(c, model) {
   return out;
 }
 
+// What was fitted to the quantity that is looked at; a fit to another one tells other errors.
+export const fitOf = (c, m) => (m.parent && m.quantity === c.quantity && m.fit?.error_after !== undefined ? m.fit : null);
+
 // The error on what was held out; that of a base model is told by the first fit that begins from it.
-export const heldOutOf = (c, m) => m.fit?.heldout_error_after ?? c.models.find((one) => one.parent === m.number && one.quantity === c.quantity && one.ready)?.fit?.heldout_error_before ?? null;
+export const heldOutOf = (c, m) => fitOf(c, m)?.heldout_error_after ?? c.models.filter((one) => one.parent === m.number).map((one) => fitOf(c, one)?.heldout_error_before).find(Number.isFinite) ?? null;
 
 // The rms beside the error, of which of strain it is not a multiple.
 export const RMS_LEFT = "model less measured, rms";

@@ -72,7 +72,7 @@ export class Plot {
   remove() { live.delete(this); this.plot?.destroy(); }
 }
 
-// The fall of the error as bars: one for each model, held-out errors as diamonds, the floor as a line.
+// The fall of the error as bars: one for each model, what a fit takes without the effect and what the effect takes beyond it as boxes, held-out errors as diamonds, the floor as a line.
 export function waterfall(steps, unit) {
   const NS = "http://www.w3.org/2000/svg";
   const make = (kind, attributes, text) => {
@@ -81,7 +81,7 @@ export function waterfall(steps, unit) {
     if (text !== undefined) one.textContent = text;
     return one;
   };
-  const width = 760, height = 263, left = 56, bottom = 65, top = 16;
+  const width = 760, height = 248, left = 56, bottom = 50, top = 16;
   const every = steps.flatMap((step) => [step.error, step.heldout]).filter(Number.isFinite);
   const high = 1.12 * Math.max(...every, 1e-9), up = (value) => height - bottom - ((height - bottom - top) * value) / high;
   const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, class: "waterfall", role: "img", "aria-label": `Error by step: ${steps.map((s) => `${s.name} ${number(s.error)}`).join(", ")} ${unit}` });
@@ -93,7 +93,10 @@ export function waterfall(steps, unit) {
     const x = left + i * room + 0.15 * room, wide = 0.5 * room;
     if (Number.isFinite(step.error)) {
       const before = i ? steps[i - 1].error : null;
-      if (Number.isFinite(before) && before > step.error) svg.append(make("rect", { x, y: up(before), width: wide, height: up(step.error) - up(before), fill: "none", stroke: "var(--quiet)", "stroke-dasharray": "4 3" }));
+      const box = (high, low, look) => { if (Number.isFinite(high) && high > low) svg.append(make("rect", { x, y: up(high), width: wide, height: up(low) - up(high), stroke: "var(--quiet)", ...look })); };
+      const anew = Number.isFinite(step.anew) ? Math.max(step.anew, step.error) : step.error;
+      box(before, anew, { fill: "none", "stroke-dasharray": "4 3" });
+      box(Math.min(anew, before ?? anew), step.error, { fill: "var(--soft)" });
       svg.append(make("rect", { x, y: up(step.error), width: wide, height: up(0) - up(step.error), fill: "var(--model)" }), make("text", { x: x + wide / 2, y: up(step.error) - 4, "text-anchor": "middle", "font-size": 13, "font-weight": 600, fill: "var(--text)" }, number(step.error)));
     }
     if (Number.isFinite(step.floor)) svg.append(make("line", { x1: x - 4, x2: x + wide + 4, y1: up(step.floor), y2: up(step.floor), stroke: "var(--text)", "stroke-width": 2, "stroke-dasharray": "2 3" }));
@@ -105,6 +108,5 @@ export function waterfall(steps, unit) {
     words.forEach((word, k) => svg.append(make("text", { x: x + wide / 2, y: height - bottom + 16 + 13 * k, "text-anchor": "middle", "font-size": 12, fill: "var(--text)" }, word)));
     svg.append(make("text", { x: x + wide / 2, y: height - bottom + 19 + 13 * words.length, "text-anchor": "middle", "font-size": 11, fill: "var(--quiet)" }, step.note || ""));
   });
-  svg.append(make("text", { x: 8, y: height - 6, "font-size": 12, fill: "var(--quiet)" }, `error [${unit}]: bar fitted runs, diamond held-out runs, dotted line what noise and structure explain`));
-  return svg;
+  return h("div", {}, svg, h("p", { class: "small quiet" }, `Error [${unit}]. Bar: on what was fitted. Dashed box: what the fit takes by its numbers alone, without the effect; pale box: what the effect takes beyond that. Diamond: held out, on parts of the measurement that were left out of the fit in turn. Dotted line: what noise and the structure of a tire, which no effect tells, would leave.`));
 }
