@@ -20,14 +20,14 @@ export function effectPage(name, e, owner) {
   const input = h("input", { value: fitted, size: 16, "aria-label": "strength" });
   const draw = (trace, strength) => {
     const row = field.rows[field.row];
-    said.textContent = `Dashed: the residual (model less measured) as it would be if ${name} of strength ${strength}${unit} alone were missing.`;
+    said.textContent = `Dashed: what ${name} of strength ${strength}${unit} would take of the residual (model less measured), beyond what the other numbers of the model take when they are fitted anew.`;
     if (isStrain(data)) {
       const n = data.angle.length;
-      plot.show({ title: row.label, unit: "microstrain", y: valueTitle(data), x: { title: "wheel angle [deg]", values: Array.from(data.angle) }, series: [{ name: "measured residual", values: sliced(data, "difference", row.index), color: "rest" }, { name: `if ${name} alone were missing`, values: trace.subarray(row.index * n, (row.index + 1) * n), color: "trace", dash: [6, 4] }] });
+      plot.show({ title: row.label, unit: "microstrain", y: valueTitle(data), x: { title: "wheel angle [deg]", values: Array.from(data.angle) }, series: [{ name: "measured residual", values: sliced(data, "difference", row.index), color: "rest" }, { name: `what ${name} takes beyond the other numbers`, values: trace.subarray(row.index * n, (row.index + 1) * n), color: "trace", dash: [6, 4] }] });
       return;
     }
     const { key, title: x } = field.slip, order = [...data.run.keys()].sort((a, b) => data[key][a] - data[key][b]);
-    plot.show({ title: "all points", unit: unitOf(data), y: valueTitle(data), x: { title: x, values: order.map((i) => data[key][i]) }, series: [{ name: "measured residual", values: order.map((i) => data.difference[i]), color: "rest", points: true }, { name: `if ${name} alone were missing`, values: order.map((i) => trace[i]), color: "trace", points: true, hollow: true }] });
+    plot.show({ title: "all points", unit: unitOf(data), y: valueTitle(data), x: { title: x, values: order.map((i) => data[key][i]) }, series: [{ name: "measured residual", values: order.map((i) => data.difference[i]), color: "rest", points: true }, { name: `what ${name} takes beyond the other numbers`, values: order.map((i) => trace[i]), color: "trace", points: true, hollow: true }] });
   };
   const file = `${app.campaign.quantity}/planted.npz`;
   let stop = () => {};

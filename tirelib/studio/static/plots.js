@@ -13,6 +13,20 @@ const axis = (label, extra = {}) => ({
   label, labelSize: large() ? 24 : 18, size: large() ? 76 : 62, ...extra,
 });
 
+function svg(kind, attributes, text) {
+  const one = document.createElementNS("http://www.w3.org/2000/svg", kind);
+  for (const [name, value] of Object.entries(attributes)) one.setAttribute(name, value);
+  if (text !== undefined) one.textContent = text;
+  return one;
+}
+
+// A line of the legend, dashed as in the plot.
+function stroke({ color: name, width = 2, dash = [] }) {
+  const mark = svg("svg", { width: 44, height: 8, "aria-hidden": true });
+  mark.append(svg("line", { x1: 0, x2: 44, y1: 4, y2: 4, stroke: `var(--${name})`, "stroke-width": width, "stroke-dasharray": dash.join(" ") }));
+  return mark;
+}
+
 // series: [{name, values, color, dash, points, width, fill}], bands: [[upper, lower, color]]
 export class Plot {
   constructor(name, { height = 210, select = null, points = false, chosen = null } = {}) {
@@ -42,7 +56,7 @@ export class Plot {
 
   make(data) {
     this.plot?.destroy();
-    fill(this.legend, this.told.series.filter((one) => !one.quiet).map((one) => { const mark = h("i", { class: one.points ? "dot" : one.dash ? "dash" : "" }); mark.style.borderColor = color(one.color); const dot = h("b", {}, one.points ? `${one.hollow ? "○" : "●"} ` : ""); dot.style.color = color(one.color); return h("span", {}, mark, dot, one.name); }));
+    fill(this.legend, this.told.series.filter((one) => !one.quiet).map((one) => { const dot = h("b", {}, one.points ? `${one.hollow ? "○" : "●"} ` : ""); dot.style.color = color(one.color); return h("span", {}, one.points ? dot : [stroke(one), " "], one.name); }));
     const { told } = this;
     this.made = large();
     this.plot = new uPlot({
@@ -74,39 +88,32 @@ export class Plot {
 
 // The fall of the error as bars: one for each model, what a fit takes without the effect and what the effect takes beyond it as boxes, held-out errors as diamonds, the floor as a line.
 export function waterfall(steps, unit) {
-  const NS = "http://www.w3.org/2000/svg";
-  const make = (kind, attributes, text) => {
-    const one = document.createElementNS(NS, kind);
-    for (const [name, value] of Object.entries(attributes)) one.setAttribute(name, value);
-    if (text !== undefined) one.textContent = text;
-    return one;
-  };
   const width = 760, height = 248, left = 56, bottom = 50, top = 16;
   const every = steps.flatMap((step) => [step.error, step.heldout]).filter(Number.isFinite);
   const high = 1.12 * Math.max(...every, 1e-9), up = (value) => height - bottom - ((height - bottom - top) * value) / high;
-  const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, class: "waterfall", role: "img", "aria-label": `Error by step: ${steps.map((s) => `${s.name} ${number(s.error)}`).join(", ")} ${unit}` });
+  const chart = svg("svg", { viewBox: `0 0 ${width} ${height}`, class: "waterfall", role: "img", "aria-label": `Error by step: ${steps.map((s) => `${s.name} ${number(s.error)}`).join(", ")} ${unit}` });
   for (const value of niceTicks(0, high / 1.12)) {
-    svg.append(make("line", { x1: left, x2: width - 8, y1: up(value), y2: up(value), stroke: "var(--grid)" }), make("text", { x: left - 6, y: up(value) + 4, "text-anchor": "end", "font-size": 12, fill: "var(--quiet)" }, number(value, 2)));
+    chart.append(svg("line", { x1: left, x2: width - 8, y1: up(value), y2: up(value), stroke: "var(--grid)" }), svg("text", { x: left - 6, y: up(value) + 4, "text-anchor": "end", "font-size": 12, fill: "var(--quiet)" }, number(value, 2)));
   }
   const room = (width - left - 8) / Math.max(steps.length, 2);
   steps.forEach((step, i) => {
     const x = left + i * room + 0.15 * room, wide = 0.5 * room;
     if (Number.isFinite(step.error)) {
       const before = i ? steps[i - 1].error : null;
-      const box = (high, low, look) => { if (Number.isFinite(high) && high > low) svg.append(make("rect", { x, y: up(high), width: wide, height: up(low) - up(high), stroke: "var(--quiet)", ...look })); };
+      const box = (high, low, look) => { if (Number.isFinite(high) && high > low) chart.append(svg("rect", { x, y: up(high), width: wide, height: up(low) - up(high), stroke: "var(--quiet)", ...look })); };
       const anew = Number.isFinite(step.anew) ? Math.max(step.anew, step.error) : step.error;
       box(before, anew, { fill: "none", "stroke-dasharray": "4 3" });
       box(Math.min(anew, before ?? anew), step.error, { fill: "var(--soft)" });
-      svg.append(make("rect", { x, y: up(step.error), width: wide, height: up(0) - up(step.error), fill: "var(--model)" }), make("text", { x: x + wide / 2, y: up(step.error) - 4, "text-anchor": "middle", "font-size": 13, "font-weight": 600, fill: "var(--text)" }, number(step.error)));
+      chart.append(svg("rect", { x, y: up(step.error), width: wide, height: up(0) - up(step.error), fill: "var(--model)" }), svg("text", { x: x + wide / 2, y: up(step.error) - 4, "text-anchor": "middle", "font-size": 13, "font-weight": 600, fill: "var(--text)" }, number(step.error)));
     }
-    if (Number.isFinite(step.floor)) svg.append(make("line", { x1: x - 4, x2: x + wide + 4, y1: up(step.floor), y2: up(step.floor), stroke: "var(--text)", "stroke-width": 2, "stroke-dasharray": "2 3" }));
+    if (Number.isFinite(step.floor)) chart.append(svg("line", { x1: x - 4, x2: x + wide + 4, y1: up(step.floor), y2: up(step.floor), stroke: "var(--text)", "stroke-width": 2, "stroke-dasharray": "2 3" }));
     if (Number.isFinite(step.heldout)) {
       const [cx, cy] = [x + wide + 12, up(step.heldout)];
-      svg.append(make("path", { d: `M${cx} ${cy - 6}l6 6-6 6-6-6z`, fill: "var(--card)", stroke: "var(--rest)", "stroke-width": 2 }), make("text", { x: cx + 9, y: cy + 4, "font-size": 12, fill: "var(--rest)" }, number(step.heldout)));
+      chart.append(svg("path", { d: `M${cx} ${cy - 6}l6 6-6 6-6-6z`, fill: "var(--card)", stroke: "var(--rest)", "stroke-width": 2 }), svg("text", { x: cx + 9, y: cy + 4, "font-size": 12, fill: "var(--rest)" }, number(step.heldout)));
     }
     const words = 7 * step.name.length > room ? step.name.split(/(?<=_)/) : [step.name]; // a name that is too wide is broken
-    words.forEach((word, k) => svg.append(make("text", { x: x + wide / 2, y: height - bottom + 16 + 13 * k, "text-anchor": "middle", "font-size": 12, fill: "var(--text)" }, word)));
-    svg.append(make("text", { x: x + wide / 2, y: height - bottom + 19 + 13 * words.length, "text-anchor": "middle", "font-size": 11, fill: "var(--quiet)" }, step.note || ""));
+    words.forEach((word, k) => chart.append(svg("text", { x: x + wide / 2, y: height - bottom + 16 + 13 * k, "text-anchor": "middle", "font-size": 12, fill: "var(--text)" }, word)));
+    chart.append(svg("text", { x: x + wide / 2, y: height - bottom + 19 + 13 * words.length, "text-anchor": "middle", "font-size": 11, fill: "var(--quiet)" }, step.note || ""));
   });
-  return h("div", {}, svg, h("p", { class: "small quiet" }, `Error [${unit}]. Bar: on what was fitted. Dashed box: what the fit takes by its numbers alone, without the effect; pale box: what the effect takes beyond that. Diamond: held out, on parts of the measurement that were left out of the fit in turn. Dotted line: what noise and the structure of a tire, which no effect tells, would leave.`));
+  return h("div", {}, chart, h("p", { class: "small quiet" }, `Error [${unit}]. Bar: on what was fitted. Dashed box: what the fit takes by its numbers alone, without the effect; pale box: what the effect takes beyond that. Diamond: held out, on parts of the measurement that were left out of the fit in turn. Dotted line: what noise and the structure of a tire, which no effect tells, would leave.`));
 }

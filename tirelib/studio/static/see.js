@@ -6,7 +6,9 @@ import { Plot } from "./plots.js";
 import { CONDITIONS, forceRows, isStrain, mean, niceTicks, rms, runWords, share, sliced, slipOf, strainRows, unitOf, varying, BINS } from "./maps.js";
 
 const TICKS = [-180, -120, -60, 0, 60, 120, 180];
-const VALUES = { difference: "model less measured", white: "whitened residual", measured: "measured" };
+const VALUES = { difference: "model less measured", white: "residual as the error counts it", measured: "measured" };
+// In the name of a line: the errors of the set points are taken out of the residual of strain, and of no curve of measurement and model.
+const named = (data, y) => `${VALUES[y]}${isStrain(data) && y === "difference" ? ", errors of the set points taken out" : ""}`;
 // Which of them are known: before the first fit only what was measured.
 const known = (data) => Object.keys(VALUES).filter((key) => data[key]?.some(Number.isFinite));
 
@@ -16,13 +18,13 @@ const worstOf = (rows) => rows.reduce((best, row, i) => (rms(row.values) > rms(r
 // The map with its controls and the plots of the chosen row; the next step shows the same with a trace.
 export class Field {
   constructor({ height = 400, onRow = null } = {}) {
-    this.by = "load"; this.value = "difference"; this.row = null; this.range = null; this.trace = null; this.onRow = onRow;
-    this.heat = new Heat("Map of the residual; arrow keys choose a run, with Shift a range", { height, choose: (at) => { this.row = at.row; this.detail(); }, brush: (range) => { this.range = range; this.detail(); this.stats(); } });
+    this.by = "load"; this.value = "difference"; this.gage = ""; this.row = null; this.range = null; this.trace = null; this.onRow = onRow;
+    this.heat = new Heat("Map of the residual; arrow keys choose a run, with Shift a range", { height, choose: (at) => { this.row = at.row; this.detail(); }, brush: (range) => this.brush(range) });
     this.controls = h("div", { class: "row" });
     this.said = h("p", { class: "small", role: "status" });
     this.element = h("div", { class: "card" }, this.controls, this.heat.element, this.said);
     this.curve = new Plot("curve", { height: 210 });
-    this.rest = new Plot("residual", { height: 190, select: (range) => { this.range = range; this.heat.range = range; this.heat.draw(); this.stats(); this.detail(); } });
+    this.rest = new Plot("residual", { height: 190, select: (range) => this.brush(range) });
   }
 
   async load(model) {
@@ -47,6 +49,7 @@ export class Field {
     const bare = this.data && !this.data.difference; // what was looked at before had no model
     this.key = key; this.data = data; this.trace = null;
     if (bare) this.row = null;
+    if (Number(this.gage) >= (data.gages?.length ?? 0)) this.gage = "";
     if (bare || !known(data).includes(this.value)) [this.value] = known(data);
     const orders = this.orders(data).map(([k]) => k);
     if (!orders.includes(this.by)) [this.by] = orders;
@@ -64,9 +67,10 @@ export class Field {
   build() {
     const { data } = this, strain = isStrain(data);
     const shown = this.trace ? "difference" : this.value; // a trace has the scale of the residual
-    this.unit = shown === "white" ? "noise" : unitOf(data);
-    const shownData = this.trace ? { ...data, trace: this.trace.values, shapes: { ...data.shapes, trace: data.shapes.difference } } : data;
-    const name = this.trace ? "trace" : this.value;
+    this.unit = shown === "white" ? unitName("noise") : unitOf(data);
+    const byGage = !this.trace && strain && data[BY_GAGE[this.value]], gages = strain ? [["", "mean"], ...Array.from(data.gages, (_, g) => [String(g), gageName(data, g)])] : [];
+    const shownData = byGage && this.gage !== "" ? { ...data, gage: strided(data, BY_GAGE[this.value], Number(this.gage)), shapes: { ...data.shapes, gage: data.shapes.measured } } : this.trace ? { ...data, trace: this.trace.values, shapes: { ...data.shapes, trace: data.shapes.difference } } : data;
+    const name = this.trace ? "trace" : byGage && this.gage !== "" ? "gage" : this.value;
     if (strain) {
       this.rows = strainRows(shownData, this.by, name);
       this.columns = data.angle.length;
@@ -80,10 +84,12 @@ export class Field {
     this.limit = limitOf((this.own || !this.first?.[shown] ? data : this.first)[shown]); // that of the base model, so that a fall is seen
     this.heat.at.row = this.row;
     this.heat.show({ columns: this.columns, rows: this.rows, x: this.x, unit: this.unit, limit: this.limit, say: (r, c) => this.cell(r, c) });
-    const title = this.trace ? `The residual if ${this.trace.name} alone were missing` : this.value === "measured" ? "What was measured" : "What is left";
-    fill(this.controls, h("h2", {}, `${title} [${this.unit}]`), h("span", { class: "room" }),
+    const title = this.trace ? `What ${this.trace.name} takes of the residual` : this.value === "measured" ? "What was measured" : "What is left";
+    const of = strain ? `, ${this.gage === "" || !byGage ? "mean of the gages" : `gage ${gageName(data, this.gage)}`}` : ` of ${data.texts.quantity}`;
+    fill(this.controls, h("h2", {}, `${title}${of} [${this.unit}]`), h("span", { class: "room" }),
       choose(this.orders(data), this.by, (by) => this.sort(by), "rows by"),
       choose(known(data).map((k) => [k, VALUES[k]]), this.value, (v) => { this.value = v; this.build(); this.detail(); }, "values"),
+      byGage && gages.length > 2 ? choose(gages, this.gage, (gage) => { this.gage = gage; this.build(); this.detail(); }, "gage") : null,
       this.first ? choose([["", "of the base model"], ["1", "of this model"]], this.own ? "1" : "", (own) => { this.own = own; this.build(); this.detail(); }, "colour scale") : null,
       choose([["diverging", "blue and red"], ["cividis", "dark to light"]], this.heat.colors, (c) => { this.heat.colors = c; this.heat.image = null; this.heat.draw(); }, "colours"),
       csvButton("map", () => this.heat.columns(strain ? 0 : 0.5)));
@@ -105,12 +111,14 @@ export class Field {
     return `${row.label}; at ${number(at, 3)} ${isStrain(this.data) ? "deg" : "slip"}: ${number(row.values[c])} ${this.unit}`;
   }
 
+  brush(range) { this.range = this.heat.range = range; this.heat.draw(); this.stats(); this.detail(); }
+
   stats() {
     const { data, range } = this;
     if (!range) { this.said.textContent = `${isStrain(data) ? (data.edges ? "The thin lines are the edges of the model's contact. The errors of the set points (load, pressure, gain and angle of each run) are taken out of the map. " : "") : "Where the map is grey, nothing was measured. "}Drag over the map or the plot (at the keyboard: Shift with the arrow keys) to see the rms of a range and its share of the squares.`; return; }
     const at = (k) => this.x.low + ((k + 0.5) * (this.x.high - this.x.low)) / this.columns;
     const found = share(data, this.value, this.rows, (k) => at(k) >= range[0] && at(k) <= range[1], data.counted);
-    this.said.textContent = `From ${number(range[0])} to ${number(range[1])}${isStrain(data) || this.slip.key === "slip_angle" ? " deg" : ""}: rms ${number(found.rms)} ${this.unit}, ${number(100 * found.share, 3)} % of the squares, ${found.count} values.`;
+    fill(this.said, `From ${number(range[0])} to ${number(range[1])}${isStrain(data) || this.slip.key === "slip_angle" ? " deg" : ""}: rms ${number(found.rms)} ${this.unit}, ${number(100 * found.share, 3)} % of the squares, ${found.count} values. `, h("button", { class: "small", type: "button", id: "clear-range", onclick: () => this.brush(null) }, "Clear the range"));
   }
 
   overlay(trace) { this.trace = trace; this.build(); this.detail(); }
@@ -171,6 +179,7 @@ export class See {
         h("div", {}, h("span", { class: "quiet" }, RMS_LEFT), h("b", { id: "rms" }, number(c.residual_rms_raw, 3)), h("span", { class: "quiet small" }, rmsOf(c))),
         h("div", {}, h("span", { class: "quiet" }, "verdict"), h("b", {}, verdictOf(model.verdict, c.error_unit, model.named) || (c.verdict === "fits" ? "the model fits" : "not known yet")), h("span", { class: "quiet small" }, !c.noise ? "the noise is not known" : c.verdict === "fits" ? "what is left is noise" : none ? "what is left is noise and the structure of a tire" : "what is left is more than noise"))),
       h("span", { class: "room" }), h("button", { class: "main", type: "button", onclick: () => this.go("suspect") }, "Find what is missing")),
+    c.error_unit === "noise" ? h("p", { class: "small quiet" }, c.quantity === "strain" ? "The error is the rms of the residual in multiples of the noise, with the errors of the set points counted as noise: load, pressure, gain and angle of each run may be off by the tolerances of the campaign. So it is smaller than the rms of model less measured divided by the noise, and a model without a fault has the error 1." : "The error is the rms of model less measured in multiples of the noise; a model without a fault has the error 1.") : null,
     said.length ? h("details", {}, h("summary", {}, `${none ? "Where model and measurement differ, though no more than in plain tires" : "Where it fails"}, in words (${said.length})`), h("ul", {}, said.map((s) => h("li", {}, inDegrees(s))))) : null);
     this.plots();
   }
@@ -201,12 +210,12 @@ export class See {
     const one = (name) => sliced(data, name, i), noise = data.noise?.[0];
     const measured = one("measured"), gages = this.gages ? gageLines(data, i, "measured_by_gage") : [];
     const band = Number.isFinite(noise) ? [{ name: "noise, upper", values: measured.map((v) => v + 2 * noise), color: "measured", width: 0.5, quiet: true }, { name: "noise, lower", values: measured.map((v) => v - 2 * noise), color: "measured", width: 0.5, quiet: true }] : [];
-    field.curve.show({ title: `strain, mean of the gages${band.length ? "; band: ± 2 noise" : ""}`, unit: "microstrain", x, bands: band.length ? [[1, 2, "measured"]] : [], series: [...band, { name: "measured", values: measured, color: "measured" }, ...(data.model ? [{ name: "model", values: one("model"), color: "model", dash: [8, 4] }] : []), ...gages] });
+    field.curve.show({ title: `strain, mean of the gages; the model at load, pressure, gain and angle as recorded${band.length ? "; band: ± 2 noise" : ""}`, unit: "microstrain", x, bands: band.length ? [[1, 2, "measured"]] : [], series: [...band, { name: "measured", values: measured, color: "measured" }, ...(data.model ? [{ name: "model", values: one("model"), color: "model", dash: [8, 4] }] : []), ...gages] });
     if (["angle", "place"].includes(this.x)) {
       const lines = this.gages && this.y !== "white" ? gageLines(data, i, this.y === "measured" ? "measured_by_gage" : "by_gage") : [];
-      const unit = this.y === "white" ? "noise" : "microstrain";
+      const unit = this.y === "white" ? unitName("noise") : "microstrain";
       field.rest.points = false;
-      field.rest.show({ title: `${VALUES[this.y] || this.y}, this run`, unit, x, series: [{ name: VALUES[this.y] || "measured", values: one(this.y), color: this.y === "measured" ? "measured" : "rest" }, ...lines] });
+      field.rest.show({ title: `${named(data, this.y)}; this run, mean of the gages`, unit, x, series: [{ name: named(data, this.y), values: one(this.y), color: this.y === "measured" ? "measured" : "rest" }, ...lines] });
       return;
     }
     const inside = (k) => !field.range || (data.angle[k] >= field.range[0] && data.angle[k] <= field.range[1]);
@@ -221,7 +230,7 @@ export class See {
       : [{ name: "rms", values: order.map((r) => sizes[r]), color: "rest", points: true }, ...(means ? [{ name: "mean", values: order.map((r) => means[r]), color: "model", points: true, hollow: true }] : [])];
     field.rest.points = true;
     field.rest.chosen = (at) => { const run = order[at]; field.row = field.rows.findIndex((r) => r.index === run); field.heat.at.row = field.row; field.heat.draw(); this.plots(); };
-    field.rest.show({ title: `${VALUES[this.y] || this.y} of each run, ${where}; click a point to choose the run`, unit: this.y === "white" ? "noise" : "microstrain", x: { title: `${title} [${unit}]`, values: order.map((r) => values[r]) }, extra: [["run", order.map((r) => data.run[r])]], series });
+    field.rest.show({ title: `${named(data, this.y)}: of each run, ${where}; click a point to choose the run`, unit: this.y === "white" ? unitName("noise") : "microstrain", x: { title: `${title} [${unit}]`, values: order.map((r) => values[r]) }, extra: [["run", order.map((r) => data.run[r])]], series });
   }
 
   forcePlots() {
@@ -233,14 +242,24 @@ export class See {
       plot.show({ title, unit: label, y: `${name}, ISO 8855 [${label}]`, x: { title: `${text} [${u}]`, values: order.map((i) => data[key][i]) }, extra: [["run", order.map((i) => data.run[i])]], series: series.map((s) => ({ ...s, points: true, values: order.map((i) => data[s.from][i]) })) });
     };
     draw(field.curve, field.rows[field.row].members, field.slip.key, [{ name: "measured", from: "measured", color: "measured" }, ...(data.model ? [{ name: "model", from: "model", color: "model", hollow: true }] : [])], data.model ? "measured (filled) and model (hollow) at these conditions" : "measured at these conditions", unit);
-    draw(field.rest, [...data.run.keys()], this.x, [{ name: VALUES[this.y] || this.y, from: this.y, color: "rest" }], "all points", this.y === "white" ? "noise" : unit);
+    draw(field.rest, [...data.run.keys()], this.x, [{ name: VALUES[this.y], from: this.y, color: "rest" }], "all points", this.y === "white" ? unitName("noise") : unit);
   }
 }
 
-const GAGE_DASH = [[2, 3], [6, 3], [10, 3], [6, 3, 2, 3], [1, 2]];
+const GAGE_DASH = [[1, 3], [5, 3], [12, 4], [8, 3, 1, 3], [14, 3, 4, 3]];
+const BY_GAGE = { difference: "by_gage", measured: "measured_by_gage" };
+const gageName = (data, g) => `y = ${number(data.gages[g], 3)} mm`;
+
+// The waveforms of one gage in all runs.
+function strided(data, name, g) {
+  const [runs, gages, n] = data.shapes[name], out = new Float32Array(runs * n);
+  for (let i = 0; i < runs; i += 1) out.set(data[name].subarray((i * gages + g) * n, (i * gages + g + 1) * n), i * n);
+  return out;
+}
+
 function gageLines(data, i, name) {
   const [, gages, n] = data.shapes[name];
-  return Array.from({ length: gages }, (_, g) => ({ name: `gage y = ${number(data.gages[g], 3)} mm`, values: data[name].subarray((i * gages + g) * n, (i * gages + g + 1) * n), color: "quiet", width: 1.2, dash: GAGE_DASH[g % 5] }));
+  return Array.from({ length: gages }, (_, g) => ({ name: `gage ${gageName(data, g)}`, values: data[name].subarray((i * gages + g) * n, (i * gages + g + 1) * n), color: `gage-${1 + (g % 5)}`, width: 1.7, dash: GAGE_DASH[g % 5] }));
 }
 
 function phase(values, angle) {

@@ -102,7 +102,7 @@ export class Suspect {
     for (const name of told.dead) put(this.dead(name, (told.dead_reasons || {})[name]), name);
     const withP = told.candidates.some((e) => e.p !== undefined && e.p !== null);
     const rank = (part) => Math.min(...groups.get(part).map((r) => Number(r.dataset.rank || 999)), 999);
-    fill(this.list, h("div", { class: "row" }, h("h2", {}, "Effects"), h("span", { class: "quiet small" }, told.byHand ? "There is no verdict: tick what you suspect, and the fit tells what it takes away." : "Hover or focus a line: dashed is the residual as it would be if this effect alone were missing. The more it looks like the measured residual, the better. Tick what to add."), h("span", { class: "room" }),
+    fill(this.list, h("div", { class: "row" }, h("h2", {}, "Effects"), h("span", { class: "quiet small" }, told.byHand ? "There is no verdict: tick what you suspect, and the fit tells what it takes away." : "Hover or focus a line: dashed is the part of the residual that this effect takes at its fitted strength, beyond what the other numbers of the model take when they are fitted anew. A flat line takes nothing; how much an effect takes, \u201cerror with it\u201d tells. Tick what to add."), h("span", { class: "room" }),
       this.button = h("button", { class: "main", type: "button", id: "add", onclick: () => this.add() }, "Add")),
     h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, told.byHand ? null : h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n", title: "how well the measurements agree with the model that has this effect; what falls below the chance of a false alarm is rejected. The smallest value that the table of plain tires can give is marked." }, withP ? "p with it" : "score / threshold"), h("th", { title: "± one standard deviation" }, "strength"), h("th", { class: "n", title: `error with this effect, ${unitName(told.error_unit)}` }, "error with it"), h("th", { class: "n", title: "chance that a diagnosis of this plan finds the effect at this strength" }, "chance to find it"))),
       h("tbody", {}, [...groups.keys()].filter((part) => groups.get(part).length).sort((a, b) => rank(a) - rank(b)).map((part) => [h("tr", { class: "part" }, h("td", { colspan: 6 }, part)), ...groups.get(part).sort((a, b) => Number(a.dataset.rank || 999) - Number(b.dataset.rank || 999))])))));
@@ -131,12 +131,12 @@ export class Suspect {
 
   owned(e) {
     const box = h("input", { type: "checkbox", checked: true, "aria-label": `untick ${e.effect}`, "data-owned": e.effect, onchange: async () => { if (!(await this.remove(e.effect))) box.checked = true; } });
-    return h("tr", { "data-rank": 0 }, h("td", {}, box), h("td", {}, `${e.effect} `, h("span", { class: "tag" }, "in the model"), h("div", { class: "small quiet" }, this.title(e.effect)?.title || "")), h("td", {}), h("td", {}, strength(e.strength)),
+    return h("tr", { "data-rank": 0, onmouseenter: () => this.hover("") }, h("td", {}, box), h("td", {}, `${e.effect} `, h("span", { class: "tag" }, "in the model"), h("div", { class: "small quiet" }, this.title(e.effect)?.title || "")), h("td", {}), h("td", {}, strength(e.strength)),
       h("td", { colspan: 2, class: "small quiet" }, "untick to take it out and fit again"));
   }
 
   dead(name, why) {
-    return h("tr", { class: "dead", "data-rank": 900 }, h("td", {}, "–"), h("td", {}, this.named({ effect: name }), h("div", { class: "small" }, this.title(name)?.title || "")), h("td", { colspan: 4, class: "small" }, `This plan cannot show it: ${why || "it changes nothing here"}`));
+    return h("tr", { class: "dead", "data-rank": 900, "data-name": name, onmouseenter: () => this.hover(name), onfocusin: () => this.hover(name) }, h("td", {}, "–"), h("td", {}, this.named({ effect: name }), h("div", { class: "small" }, this.title(name)?.title || "")), h("td", { colspan: 4, class: "small" }, `This plan cannot show it: ${why || "it changes nothing here"}`));
   }
 
   count() { this.button.textContent = this.ticked.size ? `Add ${[...this.ticked].join(", ")}` : "Add what is ticked"; this.button.disabled = !this.ticked.size; }
@@ -164,7 +164,7 @@ export class Suspect {
     if (!data) return;
     const begun = performance.now(), row = this.field.rows[this.field.row], name = this.hovered;
     const trace = name && this.traces?.[`trace_${name}`], fault = name && this.traces?.texts[`fault_${name}`];
-    const title = this.told?.byHand ? "the residual; the page of an effect plants it" : !name ? "the residual; hover an effect to see how it would be if that effect alone were missing" : fault ? `${name}: ${fault}` : trace ? `the residual, and how it would be if ${name} alone were missing` : this.traces ? `${name}: no trace` : "what each effect alone would leave is being computed";
+    const title = this.told?.byHand ? "the residual; the page of an effect plants it" : !name ? "the residual; hover an effect to see the part that it takes" : fault ? `${name}: ${fault}` : trace ? `the residual, and the part that ${name} takes` : this.told.dead.includes(name) ? `${name}: this plan cannot show it` : this.traces ? `${name}: no trace` : "what each effect takes is being computed";
     const points = !isStrain(data);
     let x, rest, own;
     if (points) {
@@ -176,7 +176,7 @@ export class Suspect {
       rest = sliced(data, "difference", row.index);
       own = trace && trace.subarray(row.index * data.angle.length, (row.index + 1) * data.angle.length);
     }
-    this.plot.show({ title: `${title}; ${row.label}`, unit: unitOf(data), y: valueTitle(data), x, series: [{ name: "measured residual, model less measured", values: rest, color: "rest", points }, { name: name ? `if ${name} alone were missing` : "if one effect alone were missing", values: own || new Array(x.values.length).fill(null), color: "trace", dash: [6, 4], points, hollow: points }] });
+    this.plot.show({ title: `${title}; ${row.label}`, unit: unitOf(data), y: valueTitle(data), x, series: [{ name: "measured residual, model less measured", values: rest, color: "rest", points }, { name: name ? `what ${name} takes beyond the other numbers` : "what an effect takes beyond the other numbers", values: own || new Array(x.values.length).fill(null), color: "trace", dash: [6, 4], points, hollow: points }] });
     app.drawn = performance.now() - begun; // how long a hover takes, [ms]
     if (this.field.trace?.name !== (trace ? name : undefined)) {
       clearTimeout(this.later);
