@@ -203,6 +203,15 @@ def test_files_that_are_no_runs_and_wrong_units_are_told_before_the_import(
         box = alert.bounding_box()  # it is seen wherever the form has been scrolled
         assert box["y"] + box["height"] <= 500
         page.set_viewport_size({"width": 1280, "height": 800})
+        page.get_by_label("free radius in mm").fill("198")
+        page.get_by_label("quantity of Fz [kN]").select_option("")
+        page.get_by_label("unit of speed [km/h]").fill("")
+        form.get_by_text("a unit is needed: m/s, km/h").wait_for()
+        page.get_by_label("unit of speed [km/h]").fill("km/h")
+        page.locator("#import").click()
+        assert "loaded radius of up to 198." in alert.inner_text()
+        assert "Fz: the vertical force is needed" in alert.inner_text()
+        page.get_by_label("quantity of Fz [kN]").select_option("Fz")
         page.get_by_label("free radius in mm").fill("203")
         page.get_by_label("unit of Fz [kN]").fill("kN")
         page.locator("#import").click()

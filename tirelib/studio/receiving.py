@@ -17,7 +17,7 @@ from tirelib.studio import intake
 from tirelib.studio.disk import read_document, safe_name, write_atomic
 from tirelib.studio.jobs import Job, Jobs
 from tirelib.studio.session import Session
-from tirelib.units import dimension_of, from_si, units_of
+from tirelib.units import QUANTITIES, dimension_of, from_si, units_of
 
 
 class Receiving:
@@ -127,6 +127,8 @@ class Receiving:
         self.files(number)
         found: dict[str, Any] = {"files": number, "map": None, "columns": None, "message": ""}
         found["plausible"] = _plausible()
+        kinds = {**QUANTITIES, "strain": "strain", "temperature": "temperature"}
+        found["units"] = {name: units_of(kind) for name, kind in kinds.items()}
         last = self._last(number)
         for kind in ("columns", "suggest"):
             job = last.get(kind)

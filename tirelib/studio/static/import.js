@@ -21,7 +21,7 @@ const part = (title, key, ...content) => h("section", {}, h("h3", {}, title, " "
 
 // A message of the import without the paths of the session, which the page does not show.
 export const bare = (message) => message.replaceAll(/\S*\/(files\/\d+|jobs\/\d+\/out)\//g, "");
-const plain = (message, map, channels) => bare(message.replaceAll(/\bchannel (\w+)/g, (all, q) => (channels[q] ? `${all} (column ${channels[q].column})` : all)).replaceAll(map, "this form").replaceAll(", see `tirelib import FILE --list`", "")).replace(/^campaign: not written.*/, "The campaign was not made, because its check would find errors. Correct what follows, or leave the column or the file out.");
+const plain = (message, map, channels) => bare(message.replaceAll(/\bchannel (\w+)/g, (all, q) => (channels[q] ? `${all} (column ${channels[q].column})` : all)).replace(/drop these rows or fill them with missing = "drop" or "interpolate" in the map, or map another column/g, "choose what is to be done at \u201crows with a missing number\u201d, or leave the column out").replaceAll(map, "this form").replaceAll("map and file state no unit", "form and file state no unit").replaceAll(", see `tirelib import FILE --list`", "")).replace(/^campaign: not written.*/, "The campaign was not made, because its check would find errors. Correct what follows, or leave the column or the file out.");
 
 // What the campaign check would say of a size in a unit; ends: its ranges by unit, in multiples of a scale.
 function unlikely(ends, unit, size, scale = 1) {
@@ -82,7 +82,7 @@ function points(measured, columns, plausible) {
 }
 
 // A column of the file: its quantity, and a unit that may differ from what the file states.
-function columnRow(column, taken, plausible, radius, change) {
+function columnRow(column, taken, { plausible, units }, radius, change) {
   const [quantity, channel] = taken.get(column.name) || ["", {}];
   const chosen = select([...new Set([...QUANTITIES, quantity])].map((q) => [q, q || "leave out"]), quantity, `quantity of ${column.name}`, () => change());
   const unit = field(channel.unit || column.unit, `unit of ${column.name}`, 7), factor = field(1, `factor of ${column.name}`, 4);
@@ -92,10 +92,13 @@ function columnRow(column, taken, plausible, radius, change) {
     const strain = chosen.value.startsWith("strain_"), found = unlikely(plausible[strain ? "strain" : chosen.value], unit.value.trim(), Math.abs(amount(factor.value)) * (strain ? column.max - column.min : column.middle), chosen.value === "loaded_radius" ? radius() : 1);
     return found && `${strain ? "it spans" : "its middle is"} ${chosen.value === "loaded_radius" ? found.replace(". Is the unit right?", ` at a free radius of ${number(1000 * radius(), 4)} mm.`) : found}`;
   };
-  const show = () => { said.textContent = [wrong() ? `instead of ${column.unit} in the file` : "", fault()].filter(Boolean).join("; "); };
+  const allowed = () => units[chosen.value.startsWith("strain_") ? "strain" : chosen.value.endsWith("_temperature") ? "temperature" : chosen.value] || [unit.value.trim()];
+  // The largest loaded radius in metres, for no tire is larger under load than without.
+  const most = () => (chosen.value === "loaded_radius" && plausible.loaded_radius[unit.value.trim()] ? (amount(factor.value) * column.max * plausible.loaded_radius.m[0]) / plausible.loaded_radius[unit.value.trim()][0] : 0);
+  const show = () => { said.textContent = [allowed().includes(unit.value.trim()) ? "" : `a unit is needed: ${allowed().join(", ")}`, wrong() ? `instead of ${column.unit} in the file` : "", fault()].filter(Boolean).join("; "); };
   for (const one of [unit, factor]) one.addEventListener("input", show);
   const rule = () => ({ column: column.name, unit: unit.value.trim(), ...(wrong() ? { override_unit: true } : {}), ...(amount(factor.value) !== 1 ? { factor: amount(factor.value) } : {}) });
-  return { column: column.name, chosen, rule, fault, show, element: h("tr", {}, h("td", {}, column.name), h("td", { class: "n" }, `${number(column.min)} … ${number(column.max)}`), h("td", { class: "n" }, column.missing || ""), h("td", {}, chosen), h("td", {}, unit, said), h("td", {}, factor)) };
+  return { column: column.name, chosen, rule, fault, most, show, element: h("tr", {}, h("td", {}, column.name), h("td", { class: "n" }, `${number(column.min)} … ${number(column.max)}`), h("td", { class: "n" }, column.missing || ""), h("td", {}, chosen), h("td", {}, unit, said), h("td", {}, factor)) };
 }
 
 // What the user has given stays when the files are read again: fields by their labels.
@@ -129,7 +132,7 @@ export async function importForm(files, read = {}, before = new Map()) {
   const lengths = LENGTHS.map(([key, text]) => ({ key, input: field(map?.tire?.[key] ? 1000 * map.tire[key] : "", `${key} in mm`), text }));
   const tire = part("Lengths of the tire", `[tire] ${LENGTHS.map(([key]) => key).join(", ")}`, h("p", { class: "small quiet" }, "A model of the strain is fitted with these lengths; a drawing of the tire or a cut through it shows them. Without them the measurement is imported and shown, but no model is fitted to its strain."), h("table", {}, h("tbody", {}, lengths.map((one) => h("tr", {}, h("td", {}, one.text), h("td", {}, h("label", {}, one.input, " mm")))))));
   const axes = select(AXES, map?.axes, "axes"), runColumn = select([["", "each file is a run"], ...file.columns.map((c) => [c.name, c.name])], map?.run_column, "run_column");
-  const rows = file.columns.map((column) => columnRow(column, taken, plausible, () => amount(radius.value) / 1000, () => update()));
+  const rows = file.columns.map((column) => columnRow(column, taken, form, () => amount(radius.value) / 1000, () => update()));
   radius.addEventListener("input", () => update());
   const measured = () => new Set(rows.map((r) => r.chosen.value).filter(Boolean)), gages = () => [...measured()].filter((q) => q.startsWith("strain_"));
   const set = points(measured, file.columns, plausible), steady = part("Set points of the runs", "[set_points]", h("p", { class: "small quiet" }, "Runs of the same set points are repeats; the noise is known from them. Round the means so far that repeats agree."), set.element);
@@ -143,11 +146,12 @@ export async function importForm(files, read = {}, before = new Map()) {
       if (channels[row.chosen.value]) faults.push(`Two columns are ${row.chosen.value}; leave one out.`);
       channels[row.chosen.value] = row.rule();
       if (row.fault() && row.chosen.value === "loaded_radius") faults.push(`[tire] free_radius_m: column ${row.column} is a loaded radius; ${row.fault()} Correct the free radius (half of the diameter), or the unit of the column.`);
+      else if (row.most() > amount(radius.value) / 1000) faults.push(`[tire] free_radius_m: column ${row.column} is a loaded radius of up to ${number(1000 * row.most(), 4)} mm, which the free radius cannot be below. Correct the free radius (half of the diameter), or the unit of the column.`);
       else if (row.fault()) faults.push(`[channels] ${row.chosen.value} (column ${row.column}): ${row.fault()} Mend the unit, or leave the column out.`);
     }
     if (!axes.value) faults.push("Choose the axis system of the files.");
     if (!(amount(radius.value) > 100)) faults.push("Give the free radius of the tire in mm: half of its diameter without load.");
-    if (!Object.keys(channels).length) faults.push("Choose at least one column.");
+    if (!channels.Fz) faults.push("[channels] Fz: the vertical force is needed, for every model is fitted over load. Choose its column as Fz.");
     for (const one of gages().length ? lengths : []) if (one.input.value.trim() && !Number.isFinite(amount(one.input.value))) faults.push(`[tire] ${one.key}: give a number in mm, or leave it empty.`);
     const places = lateral.value.trim().split(/[\s;]+/).filter(Boolean).map(amount);
     if (gages().length && (places.length !== gages().length || !places.every(Number.isFinite))) faults.push(`[gages] lateral_m: give ${gages().length} positions in mm.`);
@@ -173,7 +177,7 @@ export async function importForm(files, read = {}, before = new Map()) {
   };
   const { names } = form, kept = columns.files.map(({ file: path }, i) => [path, h("input", { type: "checkbox", checked: true, "aria-label": `import ${names[i]}` })]);
   dialog(`Import ${names.length > 3 ? `${names.length} files, ${names[0]} to ${names.at(-1)}` : names.join(", ")}`,
-    h("p", {}, "Usual names of columns are recognised, and columns that never change are left out; choose the quantity of any other. Then: choose the axis system and the kind of runs, give the free radius of the tire, and check the units. Leave out what does not belong to the measurement, and columns whose range is impossible (a turn rate or a rolling radius of a broken encoder)."),
+    h("p", {}, "Usual names of columns are recognised; choose the quantity of any other column that belongs to the measurement. The vertical force Fz is needed. Then: choose the axis system and the kind of runs, give the free radius of the tire, and check the units. Leave out what does not belong to the measurement, and columns whose range is impossible (a turn rate or a rolling radius of a broken encoder)."),
     form.message ? h("p", { class: "bad said" }, bare(form.message)) : null,
     columns.unreadable.length ? h("div", { class: "bad", id: "unreadable" }, `${columns.unreadable.length} of ${columns.unreadable.length + columns.files.length} files cannot be read and will be left out; mend them and send the folder again, or go on without them:`, h("ul", {}, columns.unreadable.map((one) => h("li", {}, bare(one.reason))))) : null,
     kept.length > 1 ? h("details", { id: "files" }, h("summary", {}, "Files: untick what is no run"), h("div", { class: "row small" }, kept.map(([, box], i) => h("label", {}, box, ` ${names[i]}`)))) : null,
