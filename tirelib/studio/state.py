@@ -6,7 +6,7 @@ from typing import Any
 
 from tirelib.studio.commands import KINDS, told
 from tirelib.studio.desk import Desk
-from tirelib.studio.disk import read_document
+from tirelib.studio.disk import read_document, safe_name
 from tirelib.studio.jobs import Job
 from tirelib.studio.parts import part_of
 from tirelib.studio.session import DOCUMENTS, QUANTITIES, Model, Opened
@@ -73,12 +73,18 @@ def campaign(desk: Desk, opened: Opened) -> dict[str, Any]:
 
 def commands(desk: Desk, opened: Opened, number: str) -> list[str]:
     """Return the command lines that repeat the way to a model, with plain file names."""
-    lines = [told(["campaign", "check", opened.folder])]
+    folder, lines = opened.folder, []
+    for job in desk.jobs.all.values():
+        if job.kind == "import" and str(desk.jobs.out(job) / "campaign") == folder:
+            folder = safe_name(str(opened.told.get("title")))
+            read = ["import", *job.order["files"], "--map", job.order["map"], "--out", folder]
+            lines.append(told(read))
+    lines.append(told(["campaign", "check", folder]))
     names: dict[str, str] = {}
     for step, model in enumerate(opened.path_to(number), start=1):
         names[model.number] = name = _file_name(step)
         action = str(model.told["action"])
-        order: dict[str, Any] = {"campaign": opened.folder, "effect": model.told["effect"]}
+        order: dict[str, Any] = {"campaign": folder, "effect": model.told["effect"]}
         order["effect_files"] = [str(path) for path in desk.session.effect_files]
         order["quantity"] = model.told["quantity"]
         if model.told["parent"] is not None:
@@ -88,7 +94,7 @@ def commands(desk: Desk, opened: Opened, number: str) -> list[str]:
         words[words.index("--json") + 1] = f"{Path(name).stem}.json"
         lines.append(told(words))
     quantity = str(opened.told.get("quantity") or "strain")
-    last = {"campaign": opened.folder, "model": names[number], "quantity": quantity}
+    last = {"campaign": folder, "model": names[number], "quantity": quantity}
     for kind, out in (("compare", "C.json"), ("diagnose", "D.json")):
         words = KINDS[kind].argv(last, ".")
         words = words[: words.index("--json")]

@@ -135,6 +135,23 @@ def test_each_quantity_has_its_own_error_of_a_model() -> None:
     assert _error({}, base, "", "Fy") == {"error": 3.0, "error_unit": "noise"}
 
 
+def test_the_commands_of_an_imported_campaign_begin_with_its_import(served: Served) -> None:
+    files = served.upload("few.csv", b"a\n1\n")[1]["files"]
+    served.do(do="dropped", files=files)
+    served.do(do="import", files=files, map={"name": "good"})
+    until(lambda: served.get("/home")["campaigns"])
+    name = served.get("/home")["campaigns"][0]["campaign"]
+    until(lambda: served.campaign(name)["models"][0]["ready"])
+    lines = served.get(f"/taken?campaign={name}&model=001&what=commands")["commands"]
+    source = next((served.folder / "session" / "files").rglob("few.csv"))
+    out = served.campaign(name)["title"]
+    assert lines[0] == f"tirelib import {source} --map {source.parent / 'map.toml'} --out {out}"
+    assert lines[1:3] == [
+        f"tirelib campaign check {out}",
+        f"tirelib identify {out} --out M.toml --json M.json",
+    ]
+
+
 def test_two_ticked_effects_are_added_one_after_the_other_and_undo_goes_back(
     served: Served, opened: str
 ) -> None:

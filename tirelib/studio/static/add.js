@@ -81,7 +81,7 @@ export class Add {
   history(c) {
     const now = current(), unit = unitName(now?.error_unit);
     const failed = c.jobs.filter((job) => ["add", "remove"].includes(job.kind) && ["failed", "cancelled", "interrupted"].includes(job.state)).slice(-3);
-    const key = JSON.stringify([c.models, c.current, failed.map((j) => j.job), failedOf("compare")?.job, failedOf("diagnose")?.job, this.hidden, c.quantity]);
+    const key = JSON.stringify([c.models, c.current, failed.map((j) => j.job), failedOf("compare")?.job, failedOf("diagnose")?.job, this.fitting().length, this.hidden, c.quantity]);
     if (key === this.key) return;
     this.key = key;
     const steps = now ? this.steps(c, now) : [];
@@ -93,7 +93,7 @@ export class Add {
     Object.entries(last?.others || {}).map(([name, one]) => h("p", one.error_after > one.error_before ? { class: "warn" } : {}, `Error of ${name}${unitOf(one)}: ${number(one.error_before, 4)} before, ${number(one.error_after, 4)} after${one.error_after > one.error_before ? `. It rises, because the same brush was fitted to ${last.quantity}: go on from the model before where ${name} matters` : ""}.`)),
     last?.held_out?.length ? heldOut(last) : null,
     last?.flags?.length ? h("p", { class: "warn" }, last.flags.map((flag) => FLAGS[flag] || flag.replaceAll("_", " ")).join(" ")) : null,
-    now?.verdict ? h("p", {}, "The verdict with this model: ", h("b", {}, verdictOf(now.verdict, now.error_unit, now.named)), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", ...ahead(now)) : now ? noVerdict(c) : null,
+    now?.verdict ? h("p", {}, "The verdict with this model: ", h("b", {}, verdictOf(now.verdict, now.error_unit, now.named)), now.named.length ? `: ${now.named.join(", ")}` : "", ". ", ...(this.fitting().length ? [] : ahead(now))) : now ? noVerdict(c) : null,
     failed.map((job) => h("p", { class: job.state === "failed" ? "bad" : "warn" }, `${job.kind} ${job.effect}: ${job.state}. ${job.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: job.job }) }, "Run again"))));
     const shown = c.models.filter((m) => m.ready && (this.hidden || !m.hidden));
     fill(this.strip, h("div", { class: "row" }, h("h2", {}, "Models"), h("span", { class: "quiet small" }, "Nothing is deleted. Continue from any of them."), h("span", { class: "room" }),

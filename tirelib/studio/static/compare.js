@@ -49,7 +49,7 @@ export function compareModels(c, models) {
     const [told, arrays] = await Promise.all([documentOf, arraysOf].map((of, k) => Promise.all(both.map((m) => of(m, ["comparison", "plots"][k], c.quantity).catch(() => null)))));
     const each = parts(told), limit = Math.max(...arrays.filter(Boolean).map((data) => limitOf(data.difference)));
     fill(body, h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), both.map((m) => h("th", {}, nameOf(m))))), h("tbody", {}, LINES.map(([text, value]) => h("tr", {}, h("td", {}, text), both.map((m, i) => h("td", {}, value(told[i], m, c) || "–")))))),
-      h("h3", {}, `What each leaves: model less measured${arrays[0] || arrays[1] ? ` [${unitOf(arrays[0] || arrays[1])}]` : ""}, one scale`),
+      h("h3", {}, `What each leaves of ${c.quantity}: model less measured${arrays[0] || arrays[1] ? ` [${unitOf(arrays[0] || arrays[1])}]` : ""}, one scale`),
       h("div", { class: "two" }, both.map((m, i) => h("div", {}, h("div", { class: "row small" }, nameOf(m), h("span", { class: "room" }), arrays[i] ? csvButton(`map-${m.number}`, () => heats[i].columns(isStrain(arrays[i]) ? 0 : 0.5)) : null), arrays[i] ? heats[i].element : h("p", { class: "quiet" }, "It has not been compared yet: continue from it once.")))),
       each.length ? h("h3", {}, `Each ${c.quantity === "strain" ? "run" : "curve"}: error [${unitName((told[0] || told[1]).error_unit)}]`) : null, h("table", {}, h("tbody", {}, each.map(([name, [x, y]]) => h("tr", {}, h("td", {}, name), h("td", { class: "n" }, number(x)), h("td", { class: "n" }, number(y)), h("td", { class: y < x ? "good" : "warn" }, change(x, y)))))));
     arrays.forEach((data, i) => data && heats[i].show(mapOf(data, limit)));

@@ -119,14 +119,14 @@ export function timeOf(job) {
   if (!job.begun || job.state !== "running") return "";
   const words = (x) => (x < 100 ? `${Math.round(x)} s` : `${Math.round(x / 60)} min`), took = Date.now() / 1000 - job.begun;
   const before = (app.campaign?.jobs || []).filter((one) => one.kind === job.kind && one.state === "done").at(-1), left = before ? before.ended - before.begun - took : 0;
-  return `${words(Math.max(0, took))}${left > 1 ? `, about ${words(left)} left, as last time` : ""}`;
+  return `${words(Math.max(0, took))} so far${left > 1 ? `, about ${words(left)} left, as last time` : ""}`;
 }
 export const progressOf = (number) => app.running.find((one) => one.job === number);
 // What a job does now and how long it has run. A job makes several fits, and the steps of each would begin anew: those of the job are told.
 export function stepOf(job) {
   if (job.state !== "running") return "waits until another job has ended";
   const at = progressOf(job.job);
-  const label = at?.label.replace(/(^|, )step .*$/, (_, comma) => `${comma}step ${at.done}`);
+  const label = at?.label.replace(/(^|, )step .*$/, (_, comma) => `${comma}step ${at.done} of this job`).replace("the base model", job.kind === "add" ? "the base model alone, for the comparison" : "the base model");
   return [label || at?.what || "the program is loading", timeOf(job)].filter(Boolean).join("; ");
 }
 

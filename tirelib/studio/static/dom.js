@@ -47,16 +47,20 @@ export const unitName = (unit) => UNITS[unit] || unit || "";
 export const large = () => window.innerWidth >= 2200;
 export const tall = () => (large() ? Math.max(1.8, window.innerHeight / 850) : 1);
 
+// One strength with its standard deviation and unit, or each of several as the equation of the effect numbers them.
+export const strengths = (value, std, unit) => [].concat(value).map((one, k, all) => `${all.length > 1 ? `s_${k + 1}: ` : ""}${number(one)} ± ${number([].concat(std)[k], 2)}${unit === "1" ? "" : ` ${unitName(unit)}`}`);
+
 let timer = 0;
+const hide = (place) => { if (place.matches(":popover-open")) place.hidePopover(); };
+export const hush = () => hide(document.getElementById("toast"));
 export function toast(text, bad = false) {
   const place = document.getElementById("toast");
   place.textContent = text;
   place.className = bad ? "bad" : "";
-  const hide = () => { if (place.matches(":popover-open")) place.hidePopover(); };
-  hide();
+  hide(place);
   place.showPopover(); // above a dialog that is open
   clearTimeout(timer);
-  timer = setTimeout(hide, bad ? 12000 : 4000);
+  timer = setTimeout(hush, bad ? 12000 : 4000);
 }
 
 export function choose(options, value, change, label) {
@@ -74,7 +78,7 @@ export function save(name, data, type = "text/csv") {
 
 // Columns of equal length: [[name, values], ...].
 export function csv(columns) {
-  const quoted = (x) => (/[",\n]/.test(x) ? `"${x.replaceAll('"', '""')}"` : x);
+  const quoted = (said) => { const x = said.replaceAll("\u2212", "-"); return /[",\n]/.test(x) ? `"${x.replaceAll('"', '""')}"` : x; };
   const cell = (x) => (x === null || x === undefined || (typeof x === "number" && !Number.isFinite(x)) ? "" : quoted(String(x)));
   const rows = [columns.map(([name]) => quoted(name)).join(",")];
   const length = Math.max(0, ...columns.map(([, values]) => values.length));

@@ -20,7 +20,7 @@ export function effectPage(name, e, owner) {
   const input = h("input", { value: fitted, size: 16, "aria-label": "strength" });
   const draw = (trace, strength) => {
     const row = field.rows[field.row];
-    said.textContent = `Dashed: what ${name} of strength ${strength}${unit} would take of the residual (model less measured), beyond what the other numbers of the model take when they are fitted anew.`;
+    said.textContent = `${isStrain(data) ? "Dashed" : "Hollow"}: what ${name} of strength ${strength}${unit} would take of the residual (model less measured), beyond what the other numbers of the model take when they are fitted anew.`;
     if (isStrain(data)) {
       const n = data.angle.length;
       plot.show({ title: row.label, unit: "microstrain", y: valueTitle(data), x: { title: "wheel angle [deg]", values: Array.from(data.angle) }, series: [{ name: "measured residual", values: sliced(data, "difference", row.index), color: "rest" }, { name: `what ${name} takes beyond the other numbers`, values: trace.subarray(row.index * n, (row.index + 1) * n), color: "trace", dash: [6, 4] }] });

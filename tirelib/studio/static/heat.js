@@ -56,7 +56,7 @@ export class Heat {
   // The map as columns of a table: the rows' names, then one for each place across, which is that far into its cell.
   columns(into) {
     const { rows, columns, x } = this.map;
-    return [["row", rows.map((row) => row.label)], ...Array.from({ length: columns }, (_, k) => [number(x.low + ((k + into) * (x.high - x.low)) / columns, 5), rows.map((row) => row.values[k])])];
+    return [[`row; values in ${this.map.unit} over ${x.title}`, rows.map((row) => row.label)], ...Array.from({ length: columns }, (_, k) => [number(x.low + ((k + into) * (x.high - x.low)) / columns, 5), rows.map((row) => row.values[k])])];
   }
 
   paint() {

@@ -1,6 +1,6 @@
 // Step 1: a campaign of the list, a folder, files that are dropped, or the example.
 import { app, get, isFinding, shown, stepOf, tell, upload, wish } from "./data.js";
-import { dialog, fill, h, number, toast } from "./dom.js";
+import { dialog, fill, h, hush, number, toast } from "./dom.js";
 import { bare, importForm } from "./import.js";
 import { confirmEffect, exampleFile } from "./own.js";
 
@@ -74,6 +74,7 @@ export class Open {
   async browse(path) {
     let found;
     try { found = await get("/browse", { path }); } catch (error) { toast(error.message, true); return; }
+    hush();
     const open = async (folder) => {
       const done = await wish({ do: "open", path: folder });
       if (done) { document.getElementById("dialog").close(); opened(done, this.go); }
@@ -82,6 +83,7 @@ export class Open {
     dialog("Choose a campaign", h("form", { class: "row", onsubmit: (event) => { event.preventDefault(); this.browse(typed.value.trim()); } }, h("label", {}, "Folder ", typed), h("button", {}, "Go there")),
       found.path ? null : h("p", { class: "quiet small" }, "Folders that the server may read where they are (tirelib studio --root adds others):"),
       h("p", { class: "small quiet" }, "The folder is not among them? ", this.whole()),
+      found.path && !found.campaign && !found.folders.some((one) => one.campaign) ? h("p", { class: "warn" }, "This folder is no campaign, and none lies directly in it: a campaign has campaign.toml, runs.csv and the recorded runs.") : null,
       found.campaign ? h("button", { class: "main", type: "button", onclick: () => open(found.path) }, "Open this campaign") : null,
       h("ul", { class: "list scroll" },
         found.path ? h("li", {}, h("button", { class: "link", type: "button", onclick: () => this.browse(found.parent) }, "↑ up")) : null,

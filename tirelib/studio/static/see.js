@@ -281,9 +281,10 @@ export function wait(place, kinds = ["check", "identify", "compare"]) {
     asked = `${c.campaign}/${model.number}/${c.quantity}`;
     wish({ do: "look", campaign: c.campaign, model: model.number, quantity: c.quantity });
   }
-  fill(place, h("h2", {}, broken && !running.length ? "It could not be computed" : c.check?.errors ? "Nothing to be seen yet" : "Being computed"),
+  fill(place, h("h2", {}, broken && !running.length ? broken.state === "cancelled" ? "It was cancelled" : "It could not be computed" : c.check?.errors ? "Nothing to be seen yet" : "Being computed"),
     running.length && !model ? h("p", { class: "quiet" }, inView() ? "The base model is fitted, and step 2 shows where it fails. How well each of its numbers is known is being computed; then the search for what is missing begins by itself." : "The campaign is checked while the base model is fitted to it; then they are compared, and the page shows it by itself. That takes some seconds to half a minute on an idle machine, longer beside other work. What was measured needs no model: step 2 shows it as soon as the runs are read.") : null,
     c.check?.errors ? h("p", { class: "bad" }, `The campaign has ${c.check.errors} ${c.check.errors === 1 ? "error" : "errors"}: `, h("a", { href: `#/open/${c.campaign}` }, "step 1 lists them with what to do"), ".") : null,
+    broken?.state === "cancelled" && running.length ? h("p", { class: "warn" }, `${broken.title}: cancelled.`) : null,
     running.map((job) => h("p", {}, `${job.title}: ${stepOf(job)}`)),
     model && running.some((job) => job.kind === "diagnose") ? h("p", { class: "quiet" }, "A diagnosis tries the effects of the catalogue, alone and together: half a minute to three minutes on an idle machine for a campaign of 66 runs, longer beside other work. Step 2 can be used meanwhile.") : null,
     !running.length && broken ? [h("p", { class: "bad" }, `${broken.title}: ${broken.state}. ${broken.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: broken.job }) }, "Run again")), ways(c, model)] : null);

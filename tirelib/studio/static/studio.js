@@ -46,7 +46,7 @@ function draw() {
 }
 
 function jobs() {
-  const shown = active().filter((job) => job.state === "running" || job.kind === "add");
+  const shown = active().filter((job) => job.state === "running" || ["add", "remove", "next-test"].includes(job.kind));
   const place = document.getElementById("jobs");
   const key = shown.map((job) => `${job.job}${job.state}`).join();
   if (place.dataset.key !== key) {

@@ -1,6 +1,6 @@
 // Step 3: which effect is missing: the verdict in four lines, the effects by part, the trace of each.
 import { app, arraysOf, current, documentOf, failedOf, plain, verdictOf, wish } from "./data.js";
-import { fill, h, number, strength, toast, unitName } from "./dom.js";
+import { fill, h, number, strength, strengths, toast, unitName } from "./dom.js";
 import { effectPage } from "./effect.js";
 import { nextRun } from "./next.js";
 import { Plot } from "./plots.js";
@@ -83,7 +83,7 @@ export class Suspect {
     fill(this.head, h("div", { class: "row" }, h("h2", {}, "The verdict"), h("span", { class: "tag alarm", id: "verdict" }, verdictOf(told.verdict, told.error_unit, told.named)),
       told.false_alarm !== undefined && told.false_alarm !== null ? h("span", { class: "quiet small" }, `chance of a false alarm: ${number(100 * told.false_alarm, 2)} %`) : null, h("span", { class: "room" }),
       told.named.length && !alike ? h("button", { type: "button", id: "tick-named", onclick: () => { for (const box of this.list.querySelectorAll("input[data-effect]")) if (told.named.includes(box.dataset.effect) && !box.checked) box.click(); this.button.focus(); } }, told.named.length > 1 ? "Tick what is named" : "Tick it") : null,
-      h("button", { type: "button", onclick: () => wish({ do: "next-test", ...this.where() }).then(() => toast("The next run is being looked for.")) }, apart ? "What would tell them apart?" : "Which run to measure next?")),
+      h("button", { type: "button", onclick: () => wish({ do: "next-test", ...this.where() }).then((done) => done && toast("The next run is looked for as soon as a processor is free; it is shown here.")) }, apart ? "What would tell them apart?" : "Which run to measure next?")),
     h("dl", { class: "verdict" }, (model.lines || []).map(([what, said]) => [h("dt", {}, TITLES[what] || what), h("dd", {}, what === "next" && told.named.length && !alike ? [`Tick ${told.named.length > 1 ? "them" : "it"} in the list below and press Add; the new model is then diagnosed by itself. `, h("details", { class: "small quiet" }, h("summary", {}, "By hand"), plain(said, model))] : plain(said, model))])),
     this.nextRun?.element);
   }
@@ -100,11 +100,11 @@ export class Suspect {
     for (const e of told.byHand || []) put(h("tr", { "data-name": e.effect }, h("td", {}, this.tick(e)), h("td", { colspan: 5 }, this.named(e), h("div", { class: "small quiet" }, e.title))), e.effect);
     for (const e of model.effects || []) put(this.owned(e), e.effect);
     for (const name of told.dead) put(this.dead(name, (told.dead_reasons || {})[name]), name);
-    const withP = told.candidates.some((e) => e.p !== undefined && e.p !== null);
+    const points = this.field.data && !isStrain(this.field.data), withP = told.candidates.some((e) => e.p !== undefined && e.p !== null);
     const rank = (part) => Math.min(...groups.get(part).map((r) => Number(r.dataset.rank || 999)), 999);
-    fill(this.list, h("div", { class: "row" }, h("h2", {}, "Effects"), h("span", { class: "quiet small" }, told.byHand ? "There is no verdict: tick what you suspect, and the fit tells what it takes away." : "Hover or focus a line: dashed is the part of the residual that this effect takes at its fitted strength, beyond what the other numbers of the model take when they are fitted anew. A flat line takes nothing; how much an effect takes, \u201cerror with it\u201d tells. Tick what to add."), h("span", { class: "room" }),
+    fill(this.list, h("div", { class: "row" }, h("h2", {}, "Effects"), h("span", { class: "quiet small" }, told.byHand ? "There is no verdict: tick what you suspect, and the fit tells what it takes away." : `Hover or focus a line: ${points ? "hollow" : "dashed"} is the part of the residual that this effect takes at its fitted strength, beyond what the other numbers of the model take when they are fitted anew. A flat line takes nothing; how much an effect takes, \u201cerror with it\u201d tells. Tick what to add.`), h("span", { class: "room" }),
       this.button = h("button", { class: "main", type: "button", id: "add", onclick: () => this.add() }, "Add")),
-    h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, told.byHand ? null : h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n", title: "how well the measurements agree with the model that has this effect; what falls below the chance of a false alarm is rejected. The smallest value that the table of plain tires can give is marked." }, withP ? "p with it" : "score / threshold"), h("th", { title: "± one standard deviation" }, "strength"), h("th", { class: "n", title: `error with this effect, ${unitName(told.error_unit)}` }, "error with it"), h("th", { class: "n", title: "chance that a diagnosis of this plan finds the effect at this strength" }, "chance to find it"))),
+    h("div", { class: "scroll tall" }, h("table", {}, h("thead", {}, told.byHand ? null : h("tr", {}, h("th", {}, ""), h("th", {}, "effect"), h("th", { class: "n", title: "how well the measurements agree with the model that has this effect; what falls below the chance of a false alarm is rejected. The smallest value that the table of plain tires can give is marked." }, withP ? "p with it" : "score / threshold"), h("th", { title: "± one standard deviation" }, "strength"), h("th", { class: "n", title: "error with this effect" }, `error with it [${unitName(told.error_unit)}]`), h("th", { class: "n", title: "chance that a diagnosis of this plan finds the effect at this strength" }, "chance to find it"))),
       h("tbody", {}, [...groups.keys()].filter((part) => groups.get(part).length).sort((a, b) => rank(a) - rank(b)).map((part) => [h("tr", { class: "part" }, h("td", { colspan: 6 }, part)), ...groups.get(part).sort((a, b) => Number(a.dataset.rank || 999) - Number(b.dataset.rank || 999))])))));
     this.count();
   }
@@ -124,14 +124,14 @@ export class Suspect {
       h("td", {}, this.named(e, e), " ", alike && inSets(e.effect, told) ? h("span", { class: "tag alarm" }, "indistinguishable") : named ? h("span", { class: "tag alarm" }, "named") : e.level !== "quiet" ? h("span", { class: "tag" }, e.level) : null,
         h("div", { class: "small quiet" }, this.title(e.effect)?.title || e.title || "", e.twins.length ? ` Looks like ${e.twins.map((t) => `${t.effect} (${number(t.angle_deg, 2)} deg apart)`).join(", ")}.` : "", inSets(e.effect, told))),
       h("td", { class: "n" }, e.p !== undefined && e.p !== null ? [number(e.p, 2), h("div", { class: "small quiet" }, e.p <= told.p_least ? "smallest" : e.p_std ? `± ${number(e.p_std, 1)}` : "")] : number(e.score / e.threshold, 3)),
-      h("td", {}, `${strength(e.strength)} ± ${strength(e.std, 2)} ${e.unit === "1" ? "" : unitName(e.unit)}`, e.in_range ? null : h("div", { class: "small warn" }, `outside the plausible ${(e.range || []).map((x) => number(x)).join(" to ")}`)),
+      h("td", {}, strengths(e.strength, e.std, e.unit).map((one) => h("div", { class: "line" }, one)), e.in_range ? null : h("div", { class: "small warn" }, `outside the plausible ${(e.range || []).map((x) => number(x)).join(" to ")}`)),
       h("td", { class: "n" }, number(e.error_after)),
       h("td", { class: "n small quiet" }, e.power !== undefined && e.power !== null ? e.power < 0.01 ? "below 1 %" : `${number(100 * e.power, 2)} %` : ""));
   }
 
   owned(e) {
     const box = h("input", { type: "checkbox", checked: true, "aria-label": `untick ${e.effect}`, "data-owned": e.effect, onchange: async () => { if (!(await this.remove(e.effect))) box.checked = true; } });
-    return h("tr", { "data-rank": 0, onmouseenter: () => this.hover("") }, h("td", {}, box), h("td", {}, `${e.effect} `, h("span", { class: "tag" }, "in the model"), h("div", { class: "small quiet" }, this.title(e.effect)?.title || "")), h("td", {}), h("td", {}, strength(e.strength)),
+    return h("tr", { "data-rank": 0, onmouseenter: () => this.hover("") }, h("td", {}, box), h("td", {}, `${e.effect} `, h("span", { class: "tag" }, "in the model"), h("div", { class: "small quiet" }, this.title(e.effect)?.title || "")), h("td", {}), h("td", {}, strength(e.strength), this.title(e.effect)?.unit === "1" ? "" : ` ${unitName(this.title(e.effect)?.unit)}`),
       h("td", { colspan: 2, class: "small quiet" }, "untick to take it out and fit again"));
   }
 

@@ -30,7 +30,7 @@ export class Take {
     fill(this.element, h("div", { class: "two" },
       h("div", {}, h("div", { class: "card" }, h("h2", {}, `The model: ${nameOf(model)}`), h("p", {}, "The identified tire with its effects, their strengths and the history of what the error did. Every command of tirelib takes it as --model."), file("model", "Save the model (TOML)")),
         made("report", "report", ["report"], "Where this model fails, with maps, waveforms and tables, in one HTML file that needs no network.", "Report"),
-        made("fmu", "StrainTire.fmu", ["calibrate", "fmu"], "The estimators of load, slip angle, slip ratio and lateral force are calibrated on this campaign (what it can inform) and exported as an FMU for co-simulation.", "FMU of the calibrated estimator")),
+        !c.quantities.includes("strain") ? null : made("fmu", "StrainTire.fmu", ["calibrate", "fmu"], "The estimators of load, slip angle, slip ratio and lateral force are calibrated on this campaign (what it can inform) and exported as an FMU for co-simulation.", "FMU of the calibrated estimator")),
       h("div", {}, h("div", { class: "card" }, h("div", { class: "row" }, h("h2", {}, "The same by hand"), h("span", { class: "room" }), h("button", { type: "button", onclick: () => navigator.clipboard.writeText(commands.join("\n")) }, "Copy"), h("button", { type: "button", onclick: () => save("journey.sh", `${commands.join("\n")}\n`, "text/plain") }, "Save")),
         h("p", { class: "quiet" }, "These commands repeat the way to this model, in any folder; files are written into the folder where they are run."), h("pre", { id: "commands" }, commands.join("\n"))),
       ownEffects())));
