@@ -24,6 +24,8 @@ TITLES = {
     "next": "What to do next",
 }
 """Title of each line, by its key in a document's `explanation`."""
+MISSED = 0.5
+"""Chance to be found below which an effect is missed more often than not."""
 SHOWN = 3
 """Other effects that a sentence lists by name."""
 
@@ -199,6 +201,21 @@ def _other(names: Sequence[str], best: Sequence[str]) -> str:
     return f"{listed(new, '')} in the place of {listed(gone, '')}"
 
 
+def _enough(told: Mapping[str, Any]) -> str:
+    """Return for which effects no further run is needed: those that the plan does not miss."""
+    chances = {e["effect"]: e.get("power") for e in told["candidates"]}
+    missed = [name for name, chance in chances.items() if chance is not None and chance < MISSED]
+    out = []
+    if len(missed) < len(chances):
+        out.append("No further run is needed for the effects that this plan finds.")
+    if missed:
+        out.append(
+            f"At a third of its plausible strength it would mostly miss {_some(missed)}: only "
+            "other runs would show such an effect."
+        )
+    return " ".join(out) or "This plan can show no effect: vary load, pressure or speed."
+
+
 def _blind(told: Mapping[str, Any]) -> list[str]:
     dead = told["dead"]
     if not dead:
@@ -247,7 +264,7 @@ def _next(told: Mapping[str, Any], given: Sequence[str]) -> str:
             f"{as_it_is} times the noise, and {anew} with its numbers fitted anew."
         )
     if told["verdict"] == "none" and told["error_unit"] == "noise":
-        return "No further run is needed for the effects that this plan can show."
+        return _enough(told)
     return f"{what[0].upper()}{what[1:]}."
 
 

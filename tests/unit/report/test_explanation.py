@@ -252,6 +252,24 @@ def test_a_rejected_model_says_what_stands_out(verdict: str, said: str) -> None:
     assert said in told.sure
 
 
+def test_effects_that_the_plan_would_mostly_miss_need_other_runs() -> None:
+    found, missed = candidate("damping", power=0.9), candidate("shear", power=0.008)
+    enough = "No further run is needed for the effects that this plan finds."
+    more = (
+        "At a third of its plausible strength it would mostly miss shear: only other runs would "
+        "show such an effect."
+    )
+
+    def said(*candidates: dict[str, Any]) -> str:
+        fits = {"error_before": 1.2, "error_refitted": 1.2, "error_after": 1.2, "floor": 1.2}
+        told = diagnosis(verdict="none", named=[], candidates=list(candidates), **fits)
+        return explained(told).next
+
+    assert said(found) == enough
+    assert said(found, missed) == f"{enough} {more}"
+    assert said(missed) == more
+
+
 def test_without_a_name_one_error_is_told() -> None:
     told = explained(diagnosis(verdict="none", named=[], error_after=23.5, floor=23.5))
     assert told.error == (
