@@ -232,7 +232,9 @@ def test_what_was_measured_is_seen_before_any_model_is_fitted(browser: Any, tmp_
         name = served.do(do="open", path=str(served.measured))[1]["campaign"]
         page = page_at(browser, f"http://{served.host}/?token={TOKEN}")
         page.evaluate(f"location.hash = '#/see/{name}'")
-        page.get_by_role("heading", name="What was measured [microstrain]").wait_for()
+        page.get_by_role(
+            "heading", name="What was measured, mean of the gages [microstrain]"
+        ).wait_for()
         page.get_by_text("fit the base model: step").wait_for()
         table = saved(page, page.locator(".heat").locator("xpath=.."))
         page.locator("canvas").first.press("ArrowUp")
