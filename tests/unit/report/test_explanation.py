@@ -288,9 +288,9 @@ def test_numbers_that_cover_for_a_missing_effect_are_told_by_what_was_held_out()
     """Fitted anew without the effect they may leave less on their own runs, and fail on others."""
     line = error_line(diagnosis(error_refitted=7.1))
     assert line.endswith(
-        "Without it, the model's own numbers fitted anew leave 7.1 on the runs that they are fitted "
-        "to: less, but 25.9 on those held out. Numbers that cover for a missing effect fit, and do "
-        "not predict."
+        "Without it, the model's own numbers fitted anew leave 7.1 on the runs that they are "
+        "fitted to: less, but 25.9 on those held out. Numbers that cover for a missing effect fit, "
+        "and do not predict."
     )
     not_held_out = {"heldout_error_before": None, "heldout_error_after": None}
     line = error_line(diagnosis(error_refitted=7.1, **not_held_out))

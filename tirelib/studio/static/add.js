@@ -1,7 +1,7 @@
 // Step 4: the refit while it runs, the fall of the error, and every model that was made.
 import { compareModels } from "./compare.js";
 import { app, current, failedOf, fitOf, heldOutOf, nameOf, pathOf, plain, progressOf, stepOf, verdictOf, wish } from "./data.js";
-import { csvButton, fill, h, number, strength, unitName } from "./dom.js";
+import { csvButton, fill, h, number, strength, strengths, unitName } from "./dom.js";
 import { Plot, waterfall } from "./plots.js";
 
 const FLAGS = {
@@ -89,7 +89,7 @@ export class Add {
     fill(this.fall, h("div", { class: "row" }, h("h2", {}, "The fall of the error"), h("span", { class: "quiet" }, c.quantity), h("span", { class: "room" }),
       csvButton("waterfall", () => [["step", steps.map((s) => s.name)], [`error [${unit}]`, steps.map((s) => s.error)], ["held-out error", steps.map((s) => s.heldout)], ["floor", steps.map((s) => s.floor)], ["numbers fitted anew without the effect", steps.map((s) => s.anew)]])),
     steps.length ? waterfall(steps, unit) : h("p", { class: "quiet" }, "There is no model yet."),
-    last ? h("p", { id: "result" }, `${last.effect}: strength ${strength(last.strength, 4)} ± ${strength(last.std, 2)}${last.unit === "1" ? "" : ` ${unitName(last.unit)}`}. Error of ${last.quantity}${unitOf(last)}: ${number(last.error_before, 4)} before, ${last.action === "add" ? `${number(last.error_refitted, 4)} with the numbers fitted anew without the effect, ` : ""}`, h("b", { id: "error-after" }, number(last.error_after, 4)), ` ${last.action === "add" ? "with it" : "without it"}. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after.`) : null,
+    last ? h("p", { id: "result" }, `${last.effect}: strength ${strengths(last.strength, last.std, last.unit).join("; ")}. Error of ${last.quantity}${unitOf(last)}: ${number(last.error_before, 4)} before, ${last.action === "add" ? `${number(last.error_refitted, 4)} with the numbers fitted anew without the effect, ` : ""}`, h("b", { id: "error-after" }, number(last.error_after, 4)), ` ${last.action === "add" ? "with it" : "without it"}. Held out: ${number(last.heldout_error_before, 4)} before, ${number(last.heldout_error_after, 4)} after.`) : null,
     Object.entries(last?.others || {}).map(([name, one]) => h("p", one.error_after > one.error_before ? { class: "warn" } : {}, `Error of ${name}${unitOf(one)}: ${number(one.error_before, 4)} before, ${number(one.error_after, 4)} after${one.error_after > one.error_before ? `. It rises, because the same brush was fitted to ${last.quantity}: go on from the model before where ${name} matters` : ""}.`)),
     last?.held_out?.length ? heldOut(last) : null,
     last?.flags?.length ? h("p", { class: "warn" }, last.flags.map((flag) => FLAGS[flag] || flag.replaceAll("_", " ")).join(" ")) : null,

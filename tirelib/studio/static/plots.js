@@ -115,5 +115,5 @@ export function waterfall(steps, unit) {
     words.forEach((word, k) => chart.append(svg("text", { x: x + wide / 2, y: height - bottom + 16 + 13 * k, "text-anchor": "middle", "font-size": 12, fill: "var(--text)" }, word)));
     chart.append(svg("text", { x: x + wide / 2, y: height - bottom + 19 + 13 * words.length, "text-anchor": "middle", "font-size": 11, fill: "var(--quiet)" }, step.note || ""));
   });
-  return h("div", {}, chart, h("p", { class: "small quiet" }, `Error [${unit}]. Bar: on what was fitted. Dashed box: what the fit takes by its numbers alone, without the effect; pale box: what the effect takes beyond that. Diamond: held out, on parts of the measurement that were left out of the fit in turn. Dotted line: what noise and the structure of a tire, which no effect tells, would leave.`));
+  return h("div", {}, chart, h("p", { class: "small quiet" }, `Error [${unit}]. Bar: on what was fitted. Dashed box: what the fit takes by its numbers alone, without the effect; pale box: what the effect takes beyond that. Diamond: held out, on parts of the measurement that were left out of the fit in turn. Dotted line: what noise and the structure of a tire would leave.`));
 }
