@@ -56,7 +56,7 @@ class TurnFlag(IntFlag):
     """The turn rate changes within the turn by more than its sources show: angles are uncertain."""
     OMEGA_MISMATCH = 2097152
     """The measured turn rate is less than two thirds, or more than 1.5 times, what the contacts
-    give."""
+    give, or its sign is not the speed's."""
 
 
 INVALIDATING = (

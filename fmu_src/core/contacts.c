@@ -2,7 +2,7 @@
 
 static const double RISE = 0.7, FALL = 0.62, JUMP = 2.5, GAP_REACH = 0.1, PATIENCE = 2.5;
 static const double SMALLEST_SWING = 5e-4, SLEW = 32.0, LEAST_SLEW = 0.1, PULSES = 250.0;
-static const double LONGEST_BURST = 0.02;
+static const double LONGEST_BURST = 0.02, SHORTER = 0.5;
 
 double contact_middle(const Contact *contact) { return 0.5 * (contact->rise + contact->fall); }
 
@@ -14,11 +14,11 @@ static void restart(ContactFinder *f) {
     f->lowest = INFINITY;
     f->highest = -INFINITY;
     f->since = f->count;
-    f->patience = f->longest_turn;
 }
 
 void finder_start(ContactFinder *f, int64_t longest_turn, int centre) {
-    f->longest_turn = longest_turn;
+    f->longest_turn = f->patience = longest_turn;
+    f->turns = f->turns_at = 0;
     f->centre = centre;
     f->count = 0;
     f->seen = f->whole = f->bursts = 0;
@@ -109,6 +109,11 @@ static int finished(ContactFinder *f, const Ring *ring, double last, Contact *fo
     double patience = fresh ? PULSES * (found->fall - found->rise) : PATIENCE * f->last_period;
     if (!fresh) f->patience = f->longest_turn; /* after a jump it is what it was */
     if (patience < (double)f->patience) f->patience = (int64_t)patience;
+    if (!fresh && ((double)f->patience > SHORTER * (double)f->turns ||
+                   f->count - f->turns_at > f->turns)) {
+        f->turns = f->patience;
+        f->turns_at = f->count;
+    }
     return 1;
 }
 
@@ -168,6 +173,9 @@ static int advance(ContactFinder *f, const Ring *ring, double y, Contact *found)
     }
     f->count++;
     if (expired) {
+        f->patience = 2 * f->patience + 1;
+        if (f->patience < f->turns) f->patience = f->turns;
+        if (f->patience > f->longest_turn) f->patience = f->longest_turn;
         restart(f);
         return 0;
     }

@@ -28,6 +28,7 @@ typedef struct {
     int levels, armed, pulse;    /* levels: not start-up; pulse: within one */
     double level, low_level, swing, lowest, highest;
     int64_t pulse_start, since, patience;
+    int64_t turns, turns_at; /* patience of the last turns known, and when the last of them ended */
     int middles, periods; /* whether the last middle, the last period are known */
     double last_middle, last_period, last_rise;
     int bursts; /* whether samples were left out since the last rise, from the first to the last */

@@ -110,8 +110,8 @@ static int conditions_beyond(const Chain *c, const Constants *k, const double *g
     return notes;
 }
 
-/* Whether a quantity of the full chain is calibrated. Reference: Chain.has */
-static int calibrated(const Chain *c, int quantity) {
+int quantity_calibrated(const Calibration *calibration, int quantity) {
+    const Chain *c = &calibration->chain[ALL_GAGES];
     const Polynomial *model[QUANTITIES] = {&c->load, &c->angle, &c->radius, &c->force};
     return model[quantity]->there;
 }
@@ -121,7 +121,7 @@ static void finish(const Calibration *cal, const Turn *turn, const Said *said, E
     const Chain *full = &cal->chain[ALL_GAGES];
     int measured = !(e->flags & INVALIDATING), in_range = 1;
     for (int q = 0; q < QUANTITIES; q++) {
-        if (!calibrated(full, q)) continue;
+        if (!quantity_calibrated(cal, q)) continue;
         int unfit = measured && !e->valid[q] && !(q == KAPPA && (e->flags & NO_SPEED));
         if (unfit) e->notes |= FZ_OUT_OF_RANGE << q;
         in_range = in_range && !unfit;

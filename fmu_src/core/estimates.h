@@ -34,6 +34,9 @@ typedef struct {
 /* How many doubles `estimate` needs to work. */
 size_t estimate_scratch(const Calibration *calibration);
 
+/* Whether the chain of all gages knows a quantity. Reference: Chain.has; test: test_native_wheel. */
+int quantity_calibrated(const Calibration *calibration, int quantity);
+
 /* Reference: Calibration.estimate; test: test_native_estimates. */
 void estimate(const Calibration *calibration, const Turn *turn, const Features *features,
               double *scratch, Estimates *estimates);

@@ -258,7 +258,8 @@ static void take_conditions(const Cutter *c, const Contact *contact, double star
     double omega = held_mean(c, OMEGA, start, stop);
     double turned = fabs(omega) * (stop - start) / (2.0 * PI * c->rate);
     if (!(turn->flags & FIRST_TURN) &&
-        (turned > LARGEST_OMEGA_RATIO || turned < 1.0 / LARGEST_OMEGA_RATIO))
+        (turned > LARGEST_OMEGA_RATIO || turned < 1.0 / LARGEST_OMEGA_RATIO ||
+         omega * speed < 0.0))
         turn->flags |= OMEGA_MISMATCH;
     turn->pressure = held_mean(c, PRESSURE, start, stop);
     turn->tread_depth = held_mean(c, TREAD_DEPTH, start, stop);

@@ -237,6 +237,7 @@ void wheel_outputs(const Wheel *w, Outputs *out) {
         out->value[q] = l->told ? SIGN[w->axes][q] * e->value[q] : NAN;
         out->std[q] = l->told ? e->std[q] : NAN;
         out->valid_of[q] = l->told && e->valid[q] && !late;
+        if (quantity_calibrated(w->calibration, q)) out->valid = out->valid && out->valid_of[q];
     }
     for (int g = 0; g < w->gages; g++) {
         out->contact_length[w->order[g]] = l->told ? e->contact_length[g] : NAN;

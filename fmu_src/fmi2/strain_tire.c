@@ -53,11 +53,11 @@ FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size
 FMI2_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean a, fmi2Real tolerance,
                                            fmi2Real start, fmi2Boolean b, fmi2Real stop) {
     (void)a, (void)tolerance, (void)start, (void)b, (void)stop;
-    return c ? fmi2OK : fmi2Error;
+    return c ? (fmi2Status)slave_unstarted(c) : fmi2Error;
 }
 
 FMI2_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
-    return c ? fmi2OK : fmi2Error;
+    return c ? (fmi2Status)slave_unstarted(c) : fmi2Error;
 }
 
 FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
@@ -65,10 +65,7 @@ FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 }
 
 FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component c) {
-    Slave *s = c;
-    if (!s) return fmi2Error;
-    s->phase = TERMINATED;
-    return fmi2OK;
+    return c ? (fmi2Status)slave_end(c) : fmi2Error;
 }
 
 FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c) {

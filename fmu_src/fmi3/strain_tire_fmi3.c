@@ -92,7 +92,7 @@ FMI3_EXPORT fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Bo
                                                    fmi3Boolean b, fmi3Float64 stop) {
     Instance *c = instance;
     (void)a, (void)tolerance, (void)b, (void)stop;
-    if (!c) return fmi3Error;
+    if (!c || slave_unstarted(c->slave)) return fmi3Error;
     c->time = start;
     return fmi3OK;
 }
@@ -106,9 +106,7 @@ FMI3_EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
 
 FMI3_EXPORT fmi3Status fmi3Terminate(fmi3Instance instance) {
     Instance *c = instance;
-    if (!c) return fmi3Error;
-    c->slave->phase = TERMINATED;
-    return fmi3OK;
+    return c && !slave_end(c->slave) ? fmi3OK : fmi3Error;
 }
 
 FMI3_EXPORT fmi3Status fmi3Reset(fmi3Instance instance) {

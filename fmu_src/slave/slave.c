@@ -78,7 +78,20 @@ void slave_reset(Slave *s) {
     s->model->first(s);
 }
 
+int slave_unstarted(Slave *s) {
+    if (s->phase == INSTANTIATED) return DONE;
+    return slave_failed(s, "the FMU is initialised; reset it before you initialise it again");
+}
+
+int slave_end(Slave *s) {
+    if (s->phase == TERMINATED)
+        return slave_failed(s, "the FMU is terminated; reset it and initialise it again");
+    s->phase = TERMINATED;
+    return DONE;
+}
+
 int slave_start(Slave *s) {
+    if (slave_unstarted(s)) return FAILED;
     s->running = s->model->start(s);
     if (!s->running) return FAILED;
     s->phase = STEPPING;

@@ -96,6 +96,12 @@ int slave_refuse(Slave *s, const char *format, ...);
 /* Bring all variables to their start values. */
 void slave_reset(Slave *s);
 
+/* Whether it may still be initialised; returns a status. */
+int slave_unstarted(Slave *s);
+
+/* Take no further steps; returns a status. */
+int slave_end(Slave *s);
+
 /* Initialise: start a wheel with the parameters as they are now. Returns a status. */
 int slave_start(Slave *s);
 

@@ -8,6 +8,8 @@
 
 #include "slave.h"
 
+enum { NAME = 200 };
+
 static const char *const AXES[] = {"iso", "sae", "adapted_sae"};
 static const char *const ROLLING[] = {"unknown", "free", "braking", "driving"};
 static const char *const FLAGS[] = {
@@ -82,6 +84,14 @@ static const char *millimetres(const double *lateral, int gages, char text[GAGES
     return text;
 }
 
+/* A name as it is shown: what is not printable ASCII, as in a damaged file, as a question mark. */
+static const char *printable(const char *name, char text[NAME]) {
+    size_t i = 0;
+    for (; name[i] && i < NAME - 1; i++) text[i] = name[i] >= ' ' && name[i] <= '~' ? name[i] : '?';
+    text[i] = 0;
+    return text;
+}
+
 /* Whether a file's numbers are those that were written: the line of an FMU's GUID holds their hash,
  * or "-" in a file of an earlier version. Reference: tirelib.fmu.native.core_file */
 static int undamaged(const Resources *file) {
@@ -130,6 +140,7 @@ static int start(Slave *s) {
     const char *path = s->text[P_CALIBRATION], *tire = s->text[P_TIRE], *known;
     double rate = s->real[P_RATE], order = s->real[P_ORDER];
     int axes = 0;
+    char name[NAME];
     if (isinf(s->real[P_MISSING]))
         return slave_failed(s,
                             "ParameterError: missing = %g; allowed are NaN and finite numbers; set "
@@ -145,7 +156,7 @@ static int start(Slave *s) {
                    "CalibrationError: StrainTire.fmu: %s: the tire is '%s', the calibration "
                    "is of '%s'; calibrate on a campaign of this tire",
                    path[0] ? path : "the embedded calibration", tire[0] ? tire : s->own.tire,
-                   known),
+                   printable(known, name)),
                0;
     if (order != 0.0 && !(fabs(order - s->calibration->order) <= 1e-6 * fabs(order)))
         return slave_failed(s,

@@ -213,8 +213,22 @@ def test_steps_before_the_start_and_after_the_end_are_refused(
     fmu.slave.terminate()
     assert fmu.read()["Fz"] == before["Fz"]
     assert refused(fmu, 0.002, "the FMU is terminated")["Fz"] == before["Fz"]
+    with pytest.raises(FMICallException):
+        fmu.slave.terminate()
     fmu.start(live.RATE)
     assert play(fmu, strain[:, :ONSET])[-1]["valid"]
+
+
+def test_it_is_initialised_once(fmu: LoadedFmu, strain: np.ndarray) -> None:
+    fmu.start(live.RATE)
+    before = play(fmu, strain[:, :ONSET])[-1]
+    for act in ("setupExperiment", "enterInitializationMode", "exitInitializationMode"):
+        fmu.messages.clear()
+        with pytest.raises(FMICallException):
+            getattr(fmu.slave, act)()
+        assert "reset it before you initialise it again" in fmu.messages[-1]
+        assert repr(fmu.read()) == repr(before)
+    assert play(fmu, strain[:, ONSET : ONSET + 10])[-1]["valid"]
 
 
 def test_a_state_knows_whether_it_was_refused_or_terminated(

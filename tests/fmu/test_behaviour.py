@@ -253,7 +253,7 @@ def test_a_condition_that_cannot_be_is_named_and_what_depends_on_it_is_not_valid
         assert {name for name in QUANTITIES if values[f"{name}_valid"]} <= valid
 
 
-@pytest.mark.parametrize("factor", [30.0 / np.pi, 0.5 / np.pi, -9.0, 1.6])
+@pytest.mark.parametrize("factor", [30.0 / np.pi, 0.5 / np.pi, -9.0, 1.6, -1.0])
 def test_a_turn_rate_that_contradicts_the_contacts_is_named_and_nothing_is_valid(
     ten: LoadedFmu, factor: float
 ) -> None:

@@ -1,6 +1,7 @@
 """A wheel of the native core shows at every step what the FMU's wheel in Python shows."""
 
 import ctypes
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from tests.fmu import live
 from tests.native.wheels import AXES, REASONS, NativeWheel
 from tests.synthetic import record
+from tirelib.estimators.calibration import Calibration
 from tirelib.flags import TurnFlag
 from tirelib.fmu.refusals import StepError
 from tirelib.fmu.wheel import Wheel
@@ -65,8 +67,14 @@ def conditions_at(step: int) -> np.ndarray:
 class Both:
     """The same wheel twice."""
 
-    def __init__(self, core: ctypes.CDLL, samples: int, axes: str = "iso") -> None:
-        known = live.calibration()
+    def __init__(
+        self,
+        core: ctypes.CDLL,
+        samples: int,
+        axes: str = "iso",
+        known: Calibration | None = None,
+    ) -> None:
+        known = known or live.calibration()
         self.wanted = Wheel(known, live.RATE, samples, axes)
         self.got = NativeWheel(core, known, live.RATE, samples, axes)
 
@@ -231,4 +239,23 @@ def test_with_a_gage_out_the_others_estimate_and_all_is_not_well(core: ctypes.CD
         both.step(strain[:, start : start + 20], 20 / live.RATE, conditions_at(1))
     valid, load_valid = both.wanted.outputs()[1][2:4]
     assert load_valid
+    assert not valid
+
+
+def test_with_a_saturated_slip_angle_the_others_are_valid_and_all_is_not(core: ctypes.CDLL) -> None:
+    known, strain = live.calibration(), live.strain_of(4e3, 0.1, turns=3.4)[0]
+    chains = {}
+    for missing, chain in known.chains.items():
+        assert chain.angle is not None
+        unsure = replace(chain.angle.polynomial, residual=np.deg2rad(1.2), floor=0.0)
+        angle = replace(chain.angle, polynomial=unsure, blur=0.0, bend=0.0)
+        chains[missing] = replace(chain, angle=angle, sliding=None)
+    both = Both(core, 20, known=replace(known, chains=chains))
+    for start in range(0, strain.shape[1] - 20, 20):
+        status = both.step(strain[:, start : start + 20], 20 / live.RATE, conditions_at(1))
+    valid, load_valid, angle_valid, _, force_valid = both.wanted.outputs()[1][2:7]
+    assert "alpha_saturated" in status
+    assert load_valid
+    assert force_valid
+    assert not angle_valid
     assert not valid

@@ -24,6 +24,8 @@ from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.variables import Variable
 
 FORMAT = "tirelib-core/1"
+NO_FRAME = (0.0, 0.0, 0.0, math.nan)
+"""Numbers of a file that is only a calibration: samples, buffer, rate, missing."""
 BINARIES = (
     "linux64/StrainTire.so",
     "aarch64-linux/StrainTire.so",
@@ -125,9 +127,7 @@ def core_file(calibration: Calibration) -> bytes:
         If the tire's name has more than one line, or the core does not know a regressor.
     """
     table = flat_table(calibration)
-    return resource_file(
-        calibration.tire, table, guid=f"{_hash(table.astype('<f8').tobytes()):016x}"
-    )
+    return hashed_file(calibration.tire, table, guid=f"{_hash(table.astype('<f8').tobytes()):016x}")
 
 
 def _hash(data: bytes) -> int:
@@ -143,10 +143,10 @@ def hashed_file(
     data: FloatArray,
     *,
     guid: str,
-    table: Sequence[Variable],
-    numbers: Sequence[float],
+    table: Sequence[Variable] = (),
+    numbers: Sequence[float] = NO_FRAME,
 ) -> bytes:
-    """Return the file of an FMU: its first line holds the hash of all that follows."""
+    """Return such a file whose first line holds the hash of all that follows."""
     file = resource_file(title, data, guid=guid, table=table, numbers=numbers)
     rest = file.removeprefix(f"{FORMAT}\n".encode())
     return f"{FORMAT} {_hash(rest):016x}\n".encode() + rest
@@ -158,7 +158,7 @@ def resource_file(
     *,
     guid: str = "-",
     table: Sequence[Variable] = (),
-    numbers: Sequence[float] = (0.0, 0.0, 0.0, math.nan),
+    numbers: Sequence[float] = NO_FRAME,
 ) -> bytes:
     """Return the file that the core reads: lines of text, then doubles, least byte first.
 

@@ -263,15 +263,33 @@ class GuardedSlave:
         return values
 
     @guarded
+    def setup_experiment(self, *_: float | None) -> None:
+        """Pass over the times; refuse them once the FMU is initialised."""
+        self._check_unstarted()
+
+    @guarded
+    def enter_initialization_mode(self) -> None:
+        """Wait for the end of the initialisation."""
+        self._check_unstarted()
+
+    def _check_unstarted(self) -> None:
+        if self._phase != "instantiated":
+            raise StepError("the FMU is initialised; reset it before you initialise it again")
+
+    @guarded
     def exit_initialization_mode(self) -> None:
         """Take up the parameters."""
+        self._check_unstarted()
         self.model = self.started()
         self._allow(self._inputs)
         self._phase = "stepping"
         self.publish()
 
+    @guarded
     def terminate(self) -> None:
         """Take no further steps; the outputs stay."""
+        if self._phase == "terminated":
+            raise StepError(_PHASES[self._phase])
         self._phase = "terminated"
 
     @guarded

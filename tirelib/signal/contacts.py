@@ -41,7 +41,13 @@ GAP_REACH = 0.1
 lie within 0.6 rad of the pulse. The levels then stay as they were. With half and double the same
 turns are valid and as exact (``python build/signal_constants.py``)."""
 MOST_TURNS_WITHOUT_CONTACT = 2.5
-"""Turns without a contact after which the search starts again."""
+"""Turns without a contact after which the search starts again.
+
+It then waits as long again for the turns known last, and twice as long each further time, up to
+`longest_turn`: what set the levels may be a burst, which no contact reaches."""
+SHORTER = 0.5
+"""A turn that takes at most this share of those known last is not believed for as long as the
+search waits: what lies between two contacts may be a burst."""
 MOST_PULSES_WITHOUT_CONTACT = 250.0
 """The same in widths of the pulse, while no turn is known: a pulse takes 1 % of a turn at least, so
 that this is what such a pulse would wait. It ends the wait for a second burst like the first."""
@@ -104,6 +110,8 @@ class ContactFinder:
         )  # numbers of samples missing since the last rise
         self._bursts: tuple[int, int] | None = None  # first and last left out since the last rise
         self._apart = 0  # samples left out since the last good one
+        self._patience = longest_turn
+        self._turns, self._turns_at = 0, 0  # patience of the turns known last, and when they ended
         self._restart()
 
     def _restart(self) -> None:
@@ -117,7 +125,6 @@ class ContactFinder:
         self._before = np.nan  # sample before the current one
         self._last_middle: float | None = None
         self._last_period: float | None = None
-        self._patience = self._longest_turn
         self._since = self._count
 
     @property
@@ -228,6 +235,8 @@ class ContactFinder:
         self._count += taken.size
         self._before = float(taken[-1])
         if expired:
+            longer = max(2 * self._patience + 1, self._turns)
+            self._patience = min(longer, self._longest_turn)
             self._restart()
         elif ended:
             self._finish(found)
@@ -332,5 +341,8 @@ class ContactFinder:
             self._last_period = contact.middle - self._last_middle
             turns = MOST_TURNS_WITHOUT_CONTACT * self._last_period
             self._patience = int(min(self._longest_turn, turns))
+            late = self._count - self._turns_at > self._turns
+            if late or self._patience > SHORTER * self._turns:
+                self._turns, self._turns_at = self._patience, self._count
         self._last_middle = contact.middle
         found.append(contact)

@@ -318,7 +318,9 @@ class TurnCutter:
         speed = known["speed"]
         turned = np.abs(known["omega"]) * period / (2.0 * np.pi * self.rate)
         if not flags & TurnFlag.FIRST_TURN and (
-            turned > LARGEST_OMEGA_RATIO or turned < 1.0 / LARGEST_OMEGA_RATIO
+            turned > LARGEST_OMEGA_RATIO
+            or turned < 1.0 / LARGEST_OMEGA_RATIO
+            or known["omega"] * speed < 0.0
         ):
             flags |= TurnFlag.OMEGA_MISMATCH
         camber, friction = (

@@ -7,6 +7,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.estimators.estimate import QUANTITIES
 from tirelib.features.extract import reference_features
 from tirelib.flags import TurnFlag
 from tirelib.held import HELD, Held
@@ -152,7 +153,10 @@ class NumpyEstimator(StreamEstimator):
     @property
     def valid(self) -> bool:
         """Whether all is well."""
-        return self._latest is not None and self._latest.valid and self._complete and not self.stale
+        if self._latest is None or not self._latest.valid or not self._complete:
+            return False
+        known = self.calibration.chains[-1]
+        return all(self.is_valid(quantity) for quantity in QUANTITIES if known.has(quantity))
 
     def is_valid(self, quantity: str) -> bool:
         """Return whether a quantity of the last estimate may be used now."""

@@ -180,3 +180,18 @@ def test_a_burst_before_a_turn_is_known_costs_few_turns(turn: float) -> None:
     disturbed[int(turn * period) : int(turn * period) + 3] = 0.05
     found = ContactFinder(int(3 * RATE)).push(disturbed)
     assert sum(not contact.fresh and contact.middle > 3.0 * period for contact in found) >= 9
+
+
+@pytest.mark.parametrize("seed", [*range(8), 39, 56, 70, 89, 97, 193, 209, 217, 259, 293, 294])
+def test_after_a_long_burst_turns_are_known_within_five(seed: int) -> None:
+    """Levels learned from it would be crossed by no contact for the 3 s of the longest turn."""
+    random = np.random.default_rng(seed)
+    strain, _, omega = record(turns=16, noise=4e-6)
+    period = 2 * np.pi / omega * RATE
+    begin = int((5.0 + random.uniform()) * period)
+    end = begin + int(random.uniform(0.05, 0.8) * period)
+    disturbed = strain[2].copy()
+    disturbed[begin:end] += random.choice([0.015, 0.03, 0.08]) * random.standard_normal(end - begin)
+    found = ContactFinder(int(3 * RATE)).push(disturbed)
+    known = [contact.middle for contact in found if not contact.fresh and contact.middle > end]
+    assert known[0] < end + 5.0 * period
