@@ -35,7 +35,7 @@ REMEDIES = {
     "DEAD_GAGE": "Look at the wiring of the gage named; estimates go on without one outer gage.",
     "PERIOD_JUMP": "Nothing after a stop or a lock; else the contacts of this turn were misread.",
     "TRIGGER_MISMATCH": "Look at the trigger's sensor; the contacts are found in the strain.",
-    "OMEGA_MISMATCH": "Give the turn rate in rad/s, of this wheel, positive forward; or not at all.",
+    "OMEGA_MISMATCH": "Give the turn rate in rad/s, of this wheel, positive forward; or omit it.",
     "DRIFT": "Let the gages warm up, or zero them again; look at the glue.",
     "NO_SPEED": "Give the travel speed (`--speed`, input `speed`); without it there is no kappa.",
     "REVERSED": "Drive forward, or turn the sign of the speed: calibrations hold forward only.",
