@@ -177,6 +177,7 @@ def _model(model: Model, quantity: str) -> dict[str, Any]:
         "verdict": diagnosis.get("verdict"),
         "named": diagnosis.get("named", []),
         "floor": diagnosis.get("floor"),
+        "refitted": diagnosis.get("error_refitted"),
         "lines": list(diagnosis.get("explanation", {}).items()),
         "documents": {
             f"{q}/{name}": stamp
@@ -207,7 +208,7 @@ _FIT = (
 )
 _ADVISES = ("messages", "reasons", "parameters", "brush")
 _COMPARED = ("error", "error_unit", "effects")
-_DIAGNOSED = ("verdict", "named", "floor", "explanation")
+_DIAGNOSED = ("verdict", "named", "floor", "error_refitted", "explanation")
 _known: dict[tuple[Path, Sequence[str]], tuple[float, Any]] = {}
 
 

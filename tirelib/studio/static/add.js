@@ -20,7 +20,9 @@ function noVerdict(c) {
 function ahead(model) {
   const link = (step, text) => h("a", { href: `#/${step}/${app.wanted}` }, text), alike = model.verdict === "indistinguishable";
   if (model.named.length && !alike) return [link("suspect", `Tick ${model.named.length > 1 ? "them" : "it"} in step 3 and press Add`), "."];
-  if (model.verdict === "none") return ["Nothing more is to be added: ", link("take", "take the model away"), " (step 5), or ", link("suspect", "tick any effect in step 3"), " to see what it does to the error."];
+  // a model that leaves twice what its own numbers would is not yet fitted to this quantity
+  const unfitted = model.refitted !== null && 2 * model.refitted < model.error;
+  if (model.verdict === "none" && !unfitted) return ["Nothing more is to be added: ", link("take", "take the model away"), " (step 5), or ", link("suspect", "tick any effect in step 3"), " to see what it does to the error."];
   return [plain(Object.fromEntries(model.lines).next || "", model), " ", link("suspect", "Step 3 shows the suspects"), "."];
 }
 
