@@ -75,7 +75,7 @@ def test_a_sealed_fmu_holds_no_campaign_and_no_measured_strain(
     document = check_fmu(tmp_path / "sealed.fmu")
     assert document["passed"], document["parts"]
     assert not document["compared"]
-    for name in signals:  # which a supplier may give beside it
+    for name in signals:  # a supplier may hand these over in a separate folder
         (tmp_path / Path(name).name).write_bytes(plain[name])
     document = check_fmu(tmp_path / "sealed.fmu", reference=tmp_path)
     assert document["passed"], document["parts"]

@@ -102,7 +102,7 @@ class Chain:
     def conditions_allowed(self, values: Mapping[str, FloatArray]) -> dict[str, BoolArray]:
         """Tell for pressure, speed and camber which turns the calibration holds for.
 
-        Unknown ones count as allowed; where they are needed, the turn is told by `no_condition`.
+        An unknown condition counts as allowed; a turn that needs it has the note `no_condition`.
         """
         laws = (self.laws, self.force_laws) if self.has("Fy") else (self.laws,)
         camber = values["camber"]

@@ -174,7 +174,7 @@ class Null:
         return np.asarray(np.max([level for level, _, _ in self._at(products)], axis=0))
 
     def _at(self, products: Products) -> Iterator[tuple[FloatArray, Weighed, FloatArray]]:
-        """Yield the log likelihood (k,) at every size, the metric, and B r beside the means."""
+        """Yield the log likelihood (k,) at every size, the metric, and B r less the means' part."""
         right, square = products
         for size, weighed in self._weighed:
             mean, gram = weighed.normal.mean, self.view.normal.gram
