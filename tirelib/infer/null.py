@@ -32,7 +32,7 @@ MORE = 8.0
 OPPOSITE = 0.5
 """What a score counts on the side of zero where the effect's range is not, as sidewalls that harden
 where they are pressed: something else is there, which plain tires show more often than an effect
-and which gets no name. Half and double of it: docs/theory/inference.md, "Numbers that decide"."""
+and which gets no name. Half and double of it: docs/theory/verdict_numbers.md."""
 SIZES = 2.0 ** np.arange(-2, 2)
 """Sizes of what one tire shows over what its family shows, among which its likelihood chooses. A
 tire that leaves little shows a weak effect; one that leaves far more than its family has something
