@@ -1,4 +1,6 @@
-"""Load levels of a calibration: errors and intervals between them (docs/theory/estimators.md).
+"""Load levels of a calibration: errors and intervals between them.
+
+What it found is in docs/theory/estimates_measured.md.
 
     python build/load_levels.py
 

@@ -38,8 +38,8 @@ COMMANDS: Mapping[str, str] = {
     "camber": "build/camber_doubt.py",
     "fall_back": "build/fall_back.py",
 }
-"""What each measures stands at the top of its file, what it found in docs/theory/estimators.md,
-docs/howto/cosim.md, docs/theory/vehicle.md and docs/reference/bench_proof.md."""
+"""What each measures stands at the top of its file, what it found in docs/howto/cosim.md,
+docs/theory/vehicle.md, docs/reference/bench_proof.md and docs/theory/estimates_measured.md."""
 
 
 def measured(name: str, folder: Path) -> bool:

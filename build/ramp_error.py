@@ -3,7 +3,7 @@
 The virtual tire rolls straight at a held load and brakes or accelerates evenly; its strain goes
 through the calibration of the co-simulations. "Even turn" is wheel angle as time times the mean
 rate of the preceding turn. Writes ``docs/theory/ramp_error.png`` and prints the tables of the
-largest errors, of steps and of slip ratios in ``docs/theory/estimators.md``.
+largest errors, of steps and of slip ratios in ``docs/theory/estimates_measured.md``.
 """
 
 import sys

@@ -80,7 +80,7 @@ ROAD_DOUBT = 0.5
 """Standard deviation of another tire's shift with tread and sliding, as a share of `ROAD_DRIFT`."""
 PRESSURE_DOUBT, SPEED_DOUBT = 0.5, 1.0
 """Tires differ: standard deviation of another tire's shift, as a share of `DRIFT`; those of the rig
-by 0.35 of the shift with pressure. ``docs/theory/estimators.md`` has half and double."""
+by 0.35 of the shift with pressure. ``docs/theory/estimate_numbers.md`` has half and double."""
 FEWEST_UNLIKE, SHARE_UNLIKE = 5, 0.08
 """Turns, and share of them, that must look like another tire's. On drawn roads and treads up to
 0.055 of a tire's own turns do (``python build/other_tire.py --own``), all above 6.5 kN on a worn

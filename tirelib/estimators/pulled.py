@@ -15,7 +15,7 @@ from tirelib.arrays import FloatArray
 
 PULL = 0.03
 """Traction at which half of it counts, T0. The rig's tires show up to 0.01 when they roll freely
-and 0.07 to 0.18 at a slip ratio of 0.015; `docs/theory/estimators.md` has half and double."""
+and 0.07 to 0.18 at a slip ratio of 0.015; `docs/theory/estimate_numbers.md` has half and double."""
 FEWEST_PULLED = 6
 """Runs with traction, and without, below which both count alike."""
 

@@ -7,7 +7,7 @@ per radian. What the slope of the contact angle leaves unexplained therefore tel
 together with a prior for a wheel of which nobody says how it stands.
 
 The constants are those of tires of the rig, ``python build/camber_doubt.py``; half and double of
-each are in ``docs/theory/estimators.md``.
+each are in ``docs/theory/estimate_numbers.md``.
 """
 
 import numpy as np

@@ -22,8 +22,8 @@ grows as :math:`C \propto k^{0.22}`.
 `EDGE`, `BENT` and `CORNERING` were measured on tires of the numerical rig by
 ``python build/road_constants.py --measure reference`` (``soft``, ``stiff``), `FORCE` was chosen on
 runs of one; `UNDER_GROOVES`, `SOFTENING` and `TEMPERATURE` are assumed. ``python
-build/road_coverage.py`` holds them against any tire; `docs/theory/estimators.md` shows half and
-double of each.
+build/road_coverage.py`` holds them against any tire; `docs/theory/estimate_numbers.md` shows half
+and double of each.
 """
 
 from collections.abc import Mapping
