@@ -335,6 +335,28 @@ def test_a_diagnosis_that_fails_says_what_can_be_done_next(browser: Any, tmp_pat
         page.context.close()
 
 
+RUNS = "!!studio.campaign?.jobs.some(job => job.kind === 'diagnose' && job.state === 'running')"
+
+
+def test_after_ones_own_cancel_nothing_is_advised_against_a_failure(
+    browser: Any, tmp_path: Path
+) -> None:
+    with closing(Served(tmp_path)) as served:
+        until(lambda: served.server.started)
+        served.hold.write_text("diagnose")
+        name = served.do(do="open", path=str(served.measured))[1]["campaign"]
+        page = page_at(browser, f"http://{served.host}/?token={TOKEN}")
+        page.evaluate(f"location.hash = '#/suspect/{name}'")
+        wait_for(page, RUNS)
+        page.get_by_role("button", name="Cancel").click()
+        page.get_by_role("heading", name="It was cancelled").wait_for()
+        said = page.locator("#ways").inner_text()
+        page.context.close()
+    assert "Go on without a verdict: tick an effect that you suspect" in said
+    assert "poor" not in said
+    assert "not determined" not in said
+
+
 NEXT = """async () => {
   const { nextRun } = await import("/next.js"), { plain } = await import("/data.js");
   const data = { load: [3000, 5000], pressure: [2, 2.4], speed: [40, 80], slip_angle: [-0.1, 0.1] };

@@ -102,8 +102,19 @@ def plot_data(
         try:
             data[f"trace_{name}"] = trace(effects[name], strength)
         except TirelibError as error:
-            data[f"fault_{name}"] = np.array(str(error))
+            data[f"fault_{name}"] = np.array(_no_trace(effects[name], strength) or str(error))
     return data
+
+
+def _no_trace(effect: Effect, strength: tuple[float, ...]) -> str:
+    """Return why an effect that cannot be negative is not drawn below zero; else nothing."""
+    if not min(strength) < effect.low == 0.0:
+        return ""
+    unit = "" if effect.unit == "1" else f" {effect.unit}"
+    return (
+        f"its strength of {min(strength):.3g}{unit} is below zero, where the effect has no "
+        f"meaning (0 to {effect.high:g}{unit} is plausible); there is nothing to draw"
+    )
 
 
 def measured_data(campaign: Campaign, runs: Iterable[Run] | None = None) -> dict[str, Any]:

@@ -113,6 +113,18 @@ def test_an_unknown_effect_is_refused() -> None:
         plot_data(found, cast(Campaign, None), file, [("nonsense", (1.0,))], CATALOGUE)
 
 
+def test_an_effect_below_zero_that_cannot_be_there_is_refused_in_plain_words() -> None:
+    file = model_file()
+    found = compare_strain(waves(EFFECT, STRENGTH), model_of(file))
+    planted = [("sidewall_damping", (-0.03,)), ("belt_shear", (0.02,))]
+    data = plot_data(found, cast(Campaign, None), file, planted, CATALOGUE)
+    assert str(data["fault_sidewall_damping"]) == (
+        "its strength of -0.03 is below zero, where the effect has no meaning (0 to 0.3 is "
+        "plausible); there is nothing to draw"
+    )
+    assert "trace_belt_shear" in data
+
+
 def test_the_scatter_of_a_rig_makes_no_set_points_of_its_own(tmp_path: Path) -> None:
     def scattered() -> Iterator[Run]:
         rng = np.random.default_rng(11)

@@ -1,9 +1,9 @@
 """`tirelib.studio.runner` whose jobs write at once what a command would write.
 
 While the file of the environment variable HOLD exists, fits go on; a base fit tells its ring first
-if the file holds "first". If it holds "check", checks go on instead. The check of a campaign whose
-header says "bad" tells an error. An import with a map of the name "bad" fails. Every command line
-is noted in the file of the environment variable SAID.
+if the file holds "first". If it holds "check" or "diagnose", these go on instead. The check of a
+campaign whose header says "bad" tells an error. An import with a map of the name "bad" fails. Every
+command line is noted in the file of the environment variable SAID.
 """
 
 import json
@@ -58,7 +58,7 @@ def work(words: Sequence[str]) -> None:
     verb = words[1] if words[0] == "campaign" else words[0]
     hold = Path(os.environ["HOLD"])
     held = hold.read_text() if hold.exists() else None
-    slow = ("check",) if held == "check" else ("add", "identify")
+    slow = (held,) if held in ("check", "diagnose") else ("add", "identify")
     if (first := value(words, "--first")) and held == "first":
         first.write_text("model = 0\n")
     for step in range(1, 100000):

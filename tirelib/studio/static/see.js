@@ -287,18 +287,20 @@ export function wait(place, kinds = ["check", "identify", "compare"]) {
     broken?.state === "cancelled" && running.length ? h("p", { class: "warn" }, `${broken.title}: cancelled.`) : null,
     running.map((job) => h("p", {}, `${job.title}: ${stepOf(job)}`)),
     model && running.some((job) => job.kind === "diagnose") ? h("p", { class: "quiet" }, "A diagnosis tries the effects of the catalogue, alone and together: half a minute to three minutes on an idle machine for a campaign of 66 runs, longer beside other work. Step 2 can be used meanwhile.") : null,
-    !running.length && broken ? [h("p", { class: "bad" }, `${broken.title}: ${broken.state}. ${broken.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: broken.job }) }, "Run again")), ways(c, model)] : null);
+    !running.length && broken ? [h("p", { class: "bad" }, `${broken.title}: ${broken.state}. ${broken.message} `, h("button", { class: "small", type: "button", onclick: () => wish({ do: "again", job: broken.job }) }, "Run again")), ways(c, model, broken.state === "cancelled")] : null);
 }
 
 // What can be done where a step of the way has failed: other quantities, where the model fails, what the fit says.
-export function ways(c, model) {
+// What the user has ended has not failed: it is run again, or gone on without.
+export function ways(c, model, ended = false) {
   if (!model) return null;
   const base = c.models.find((m) => m.parent === null && m.ready), errors = base?.fit?.force_errors || {}, advice = base?.advice || [];
   const others = c.quantities.filter((q) => q !== c.quantity), told = (q) => (errors[q]?.error ? `, error ${number(errors[q].error)} ${unitName(errors[q].error_unit)}` : "");
   return h("div", { id: "ways" }, h("h3", {}, "What can be done next"),
     h("ul", {},
       others.length ? h("li", {}, "Look at another quantity: ", others.map((q) => h("button", { class: "small", type: "button", "data-quantity": q, onclick: () => wish({ do: "look", campaign: c.campaign, model: model.number, quantity: q }) }, `${q}${told(q)}`))) : null,
-      model.documents[`${c.quantity}/plots.npz`] ? h("li", {}, h("a", { href: `#/see/${c.campaign}` }, "See where the model fails"), ", and in words what a fit as poor as this one may come from: a unit, a sign, another tire, a run that went wrong.") : null,
+      model.documents[`${c.quantity}/plots.npz`] ? h("li", {}, h("a", { href: `#/see/${c.campaign}` }, "See where the model fails"), ended ? "." : ", and in words what a fit as poor as this one may come from: a unit, a sign, another tire, a run that went wrong.") : null,
+      ended && model.documents[`${c.quantity}/plots.npz`] ? h("li", {}, "Go on without a verdict: ", h("a", { href: `#/suspect/${c.campaign}` }, "tick an effect that you suspect"), " in step 3 and press Add; the fit tells what it takes away.") : null,
       c.models.length > 1 ? h("li", {}, h("a", { href: `#/add/${c.campaign}` }, "Continue from another model"), " of the history.") : null,
-      advice.length ? h("li", {}, "Do what the fit of the base model says and advises:", h("ul", {}, advice.map((said) => h("li", {}, said)))) : null));
+      advice.length && !ended ? h("li", {}, "Do what the fit of the base model says and advises:", h("ul", {}, advice.map((said) => h("li", {}, said)))) : null));
 }
