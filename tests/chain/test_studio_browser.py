@@ -167,6 +167,35 @@ def test_in_the_middle_of_a_refit_nothing_is_lost(browser: Any, journey: Journey
     assert shown == [digits(fit["error_after"])] * 2
 
 
+def test_two_quantities_have_their_own_numbers_and_one_brush(browser: Any, tmp_path: Path) -> None:
+    """What is added for the side force is told of the aligning moment as well."""
+    runs = steady_runs(angles=(-5.0, -2.0, 2.0, 5.0), slope=0.25, moment=True)
+    write_forces(tmp_path / "both", runs, "both")
+    shown = {}
+    with serve(tmp_path, str(tmp_path / "both")) as (_, url):
+        page = page_at(browser, url)
+        for quantity in ("Fy", "Mz", "Fy"):
+            wait_for(page, "!document.getElementById('quantity-box').hidden")
+            page.locator("#quantity").select_option(quantity)
+            page.get_by_role("heading", name=f"What is left of {quantity}").wait_for()
+            shown[quantity] = page.locator("#error").inner_text()
+        page.get_by_role("button", name="Find what is missing").click()
+        page.locator("input[data-effect=friction_load]").click()
+        page.locator("#add").click()
+        wait_for(page, "studio.campaign.current === '002'")
+        added = page.locator("#error-after").inner_text()
+        other = page.get_by_text("Error of Mz").inner_text()
+        page.context.close()
+    models = next(tmp_path.glob("s/campaigns/*/models"))
+    for quantity, error in shown.items():
+        told = json.loads((models / "001" / quantity / "comparison.json").read_text())
+        assert (told["quantity"], error) == (quantity, digits(told["error"]))
+    fit = json.loads((models / "002" / "fit.json").read_text())
+    moment = fit["others"]["Mz"]
+    assert added == digits(fit["error_after"])
+    assert f"{digits(moment['error_before'])} before, {digits(moment['error_after'])}" in other
+
+
 def tab_to(page: Any, selector: str) -> None:
     """Press Tab until an element has the focus."""
     for _ in range(300):

@@ -41,6 +41,7 @@ def steady_runs(
     repeats: int = 2,
     slope: float = 0.0,
     factor: float = 1.0,
+    moment: bool = False,
 ) -> Iterable[Run]:
     """Yield cornering runs of a brush whose friction falls with load by a power `slope`."""
     rng = np.random.default_rng(7)
@@ -62,6 +63,8 @@ def steady_runs(
                     "speed": 18.0,
                     "Fy": side,
                 }
+                if moment:
+                    rig["Mz"] = found.Mz.item() + 0.5 * rng.standard_normal()
                 yield Run(
                     RunPlan(
                         number,
