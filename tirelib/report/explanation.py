@@ -140,8 +140,9 @@ def _by_p(told: Mapping[str, Any]) -> str:
                 f"{number(first['score'] / first['threshold'], 2)} of the score that would count."
             )
         return (
-            f"A share of {p} of plain tires, in which nothing is hidden, show as much as this one "
-            f"(p = {p}; below {level} something would be missing).{most}"
+            f"In {number(100.0 * told['p'], 2)} % of plain tires, in which nothing is hidden, at "
+            f"least as much stands out as in this one (p = {p}; below {level} something would be "
+            f"missing).{most}"
         )
     it = "it" if len(told["sets"] and told["sets"][0]) == 1 else "them"
     if told["verdict"] not in ("unknown", "form_inadequate"):

@@ -4,6 +4,13 @@ import { dialog, h, number } from "./dom.js";
 import { isStrain, sliced, unitOf, valueTitle } from "./maps.js";
 import { Plot } from "./plots.js";
 
+const SYMBOLS = {
+  s: "the strength", s_1: "the first number of the strength", s_2: "the second", s1: "the first number of the strength", s2: "the second",
+  k_u: "radial stiffness of the sidewall", k_v: "tangential stiffness of the sidewall", k_t: "radial stiffness of the tread", EI: "bending stiffness of the belt", EA: "stiffness of the belt along itself",
+  A: "section of the belt", R: "radius of the belt", R0: "free radius of the tire", Omega: "turn rate of the wheel", Fz: "load", Fz0: "reference load", p0: "reference pressure", c_px: "longitudinal stiffness of the brush", c_py: "lateral stiffness of the brush", mu: "friction",
+};
+const meaningOf = (equation) => Object.entries(SYMBOLS).filter(([symbol]) => new RegExp(`(?<![\\w'])${symbol}(?![\\w'])`).test(equation)).map(([symbol, said]) => `${symbol}: ${said}`).join("; ");
+
 // The strength that is tried first where none was fitted: half of the larger end of the plausible range.
 function halfOf({ components, range: [low, high] }) {
   const half = (Math.abs(high) >= Math.abs(low) ? high : low) / 2;
@@ -52,7 +59,7 @@ export function effectPage(name, e, owner) {
     if (!(await wish({ do: "plant", ...owner.where(), effect: name, strength: numbers }))) stop();
   };
   const box = dialog(name, h("p", {}, about.title), h("p", { class: "small" }, `Acts on: ${about.stage}. Varies with: ${about.varies_with.join(", ") || "nothing"}. Plausible strength: ${about.range.map((x) => number(x)).join(" to ")}${unit}.`),
-    h("h3", {}, "Equation"), h("p", {}, about.equation || "The law itself says it:"), h("details", {}, h("summary", {}, "The law as it is computed"), h("pre", {}, about.law)),
+    h("h3", {}, "Equation"), h("p", {}, about.equation || "The law itself says it:"), h("p", { class: "small quiet" }, meaningOf(about.equation || "")), h("details", {}, h("summary", {}, "The law as it is computed"), h("pre", {}, about.law)),
     h("h3", {}, "Source"), h("p", {}, about.source), h("h3", {}, "What it would look like here"),
     h("div", { class: "row" }, h("label", {}, "strength ", input, unit), h("button", { type: "button", onclick: plant }, "Plant it")), said, plot.element);
   const known = traces?.[`trace_${name}`];
