@@ -1,6 +1,7 @@
 """Draw the dissertation's figures of the ring model (chapters 5 and 6) from the tires in `models`.
 
     .venv/bin/python build/figures.py
+    .venv/bin/python build/figures.py --only 6-33   one of them
     .venv/bin/python build/figures.py --gallery     and the pictures of docs/theory/gallery.md
 
 Everything lands in ``build/out/figures``; open its ``index.html``.
@@ -232,15 +233,20 @@ def main() -> None:
     """Draw everything and write the page."""
     parser = argparse.ArgumentParser(description="Figures of chapters 5 and 6 from the ring model.")
     parser.add_argument("--out", type=Path, default=ROOT / "build/out/figures", metavar="DIR")
+    parser.add_argument("--only", metavar="NAME", help="draw one figure, for instance 6-33")
     parser.add_argument("--gallery", action="store_true", help="renew docs/theory/gallery")
     given = parser.parse_args()
     folder = given.out.resolve()
     console, sections, missing = Console(), [], []
     for number, (title, drawings) in enumerate(CHAPTERS.items(), 1):
+        wanted = [each for each in drawings() if given.only in (None, each.name)]
         with console.status(f"drawing: {title}"):
-            pictures = draw_all(folder, drawings())
+            pictures = draw_all(folder, wanted)
         missing += [picture for picture in pictures if not picture.file]
-        sections.append(Section(title, f"part-{number}", pictures=pictures))
+        if wanted:
+            sections.append(Section(title, f"part-{number}", pictures=pictures))
+    if not sections:
+        parser.error(f"there is no figure {given.only}")
     page = write_page(
         folder,
         "base.html",

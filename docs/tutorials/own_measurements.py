@@ -28,6 +28,7 @@ import tempfile
 import tomllib
 from itertools import chain
 from pathlib import Path
+from textwrap import fill
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -62,13 +63,14 @@ def shell(line, lines=99):
     done = subprocess.run(
         [sys.executable, "-m", *chain(*words)],
         cwd=folder,
-        env={**os.environ, "COLUMNS": "110"},
+        env={**os.environ, "COLUMNS": "88"},
         capture_output=True,
         text=True,
         check=False,
     )
     answer = done.stdout if done.returncode < 2 else done.stderr[done.stderr.find("Error") :]
-    print(f"$ {line}", *answer.rstrip().splitlines()[:lines], sep="\n")
+    for said in [f"$ {line}", *answer.rstrip().splitlines()[:lines]]:
+        print(fill(said, 88, subsequent_indent="    "))
 
 
 shell("tirelib import load2000.csv --list")
