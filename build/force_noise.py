@@ -20,7 +20,7 @@ from tirelib.identify.force_data import FORCES, force_data
 from tirelib.identify.force_points import ForcePoints, force_points
 from tirelib.threads import one_thread
 
-CONSTANTS = ("LEAST", "MOST", "REACH", "STEEPEST")
+CONSTANTS = ("FEWEST_NEIGHBOURS", "MOST_NEIGHBOURS", "NEIGHBOUR_REACH", "STEEPEST")
 
 
 def main() -> None:

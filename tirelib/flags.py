@@ -1,6 +1,5 @@
 """Flags of a turn: its faults, and whether it may still be used."""
 
-from collections.abc import Iterable
 from enum import IntFlag
 
 
@@ -86,11 +85,3 @@ def flag_names(value: int) -> list[str]:
     ['first_turn', 'spike']
     """
     return [flag.name.lower() for flag in TurnFlag if flag & value and flag.name]
-
-
-def union(flags: Iterable[int]) -> int:
-    """Return all flags of `flags` together."""
-    total = 0
-    for flag in flags:
-        total |= int(flag)
-    return total

@@ -192,11 +192,6 @@ class TodaysBrakes:
         self.acceleration = np.zeros(4)
         self.torque = np.zeros(4)
 
-    @property
-    def controlled(self) -> list[bool]:
-        """Tell which wheels have left the driver's pressure."""
-        return [phase is not Phase.FREE for phase in self.phases]
-
     def step(self, rims: FloatArray, speed: float, most: FloatArray, step: float) -> FloatArray:
         """Return brake torques [N m], shape (4,).
 

@@ -20,7 +20,7 @@ from tests.magic_sweep import _force
 from tirelib.arrays import FloatArray
 from tirelib.compare.force_model import ForceModel
 from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.fit import Problem
+from tirelib.diagnose.forces.fit import MeasuredForce
 from tirelib.diagnose.forces.models import plain_tires
 from tirelib.effects import CATALOGUE
 from tirelib.identify.brush_fit import fit_brush
@@ -188,7 +188,7 @@ def case_of(data: ForceData) -> ForceCase:
     model = ForceModel(
         "fitted", BrushModel("fitted", values, fit.reference, None), (), reference, ()
     )
-    problem = Problem.of(model.bench(force_points(data)), "Fy", NOISE)
+    problem = MeasuredForce.of(model.bench(force_points(data)), "Fy", NOISE)
     return ForceCase("steady", model, problem, problem, NOISE, len(problem) // 2, ())
 
 
@@ -289,5 +289,5 @@ def _with_run(
     measured = np.concatenate([case.problem.measured, side])
     data = replace(bench.points.data, Fy=measured)
     bench = replace(bench, points=replace(bench.points, data=data))
-    longer = Problem.of(bench, "Fy", NOISE)
+    longer = MeasuredForce.of(bench, "Fy", NOISE)
     return replace(case, problem=longer, whole=longer)

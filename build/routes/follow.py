@@ -29,12 +29,6 @@ class Routes:
     reasons: tuple[str, ...]
 
     @property
-    def modal_damping(self) -> Quantity | None:
-        """The same shift as a ratio that every harmonic has, Eq. (107)."""
-        found = self.dynamic.damping_modal if self.dynamic else None
-        return found.without_angle if found else None
-
-    @property
     def damping(self) -> Quantity | None:
         """Damping ratio of the sidewall from the waveforms alone, without the trigger."""
         found = self.dynamic.damping if self.dynamic else None

@@ -39,7 +39,7 @@ SLIP_LIMITS = {
     "slip_angle": np.deg2rad([1.0, 2.0, 4.0, 6.0, 9.0]),
     "slip_ratio": np.array([0.02, 0.05, 0.1, 0.2]),
 }
-LEVEL, LEAST_SHARE, MOST = 0.01, 0.02, 6
+LEVEL, LEAST_SHARE, MOST_REGIONS = 0.01, 0.02, 6
 CELLS = (
     "cells of 0.5 deg in slip angle and camber, 0.01 in slip ratio, a tenth in load, pressure and "
     "speed, 5 K in tread temperature"
@@ -295,7 +295,8 @@ def _sentences(name: str, table: Sequence[ForceCell], freedom: int) -> tuple[str
     for cell in ranked:
         t = abs(cell.excess) / cell.excess_std if cell.excess_std > 0 else 0.0
         p = 2.0 * special.stdtr(freedom, -t) * len(parts)
-        if p < LEVEL and cell.points * cell.excess**2 > LEAST_SHARE * total and len(out) < MOST:
+        large = cell.points * cell.excess**2 > LEAST_SHARE * total
+        if p < LEVEL and large and len(out) < MOST_REGIONS:
             out.append(_say(name, cell))
     return tuple(out)
 

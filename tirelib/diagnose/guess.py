@@ -19,7 +19,8 @@ from tirelib.identify.random_effects import angle_slope
 from tirelib.model.state import Operating
 from tirelib.waveforms import GRID
 
-MOST = 3
+MOST_TERMS = 3
+"""Terms of a guessed law at most."""
 LEAST_GAIN = 0.03
 """Share of the held-out squares that a further term has to take away."""
 WORTH = 0.3
@@ -105,7 +106,7 @@ def guess_law(
         return None
     chosen: list[int] = []
     best = 0.0
-    while len(chosen) < MOST:
+    while len(chosen) < MOST_TERMS:
         further = _next(columns, response, chosen)
         told = _held_out(columns, response, [*chosen, further], folds)
         if told < best + LEAST_GAIN:

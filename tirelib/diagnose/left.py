@@ -16,9 +16,9 @@ from tirelib.waveforms import GRID
 
 FLAT = 0.2
 """Power of a condition below which the residual is said not to change with it."""
-LEAST, TINY = 1e-3, 1e-12
+LEAST_MISFIT_SHARE, LEAST_MISFIT = 1e-3, 1e-12
 """Size below which a misfit counts as this large: over the largest, and at all."""
-MOST = 0.7
+SHARE_IN_RANGE = 0.7
 """Share of the squares that the told range of angles holds."""
 CONDITIONS = ("load", "pressure", "speed", "slip_angle", "camber", "slip_ratio")
 
@@ -48,7 +48,8 @@ class Left:
     where, scaling : str
         In words.
     span : tuple of float, [rad]
-        Shortest range of angles with `MOST` of the squares; the second end may lie past pi.
+        Shortest range of angles with `SHARE_IN_RANGE` of the squares; the second end may lie past
+        pi.
     sectors : mapping of sector to float
         Share of the squares.
     powers : mapping of condition to Power or None
@@ -118,10 +119,10 @@ def told_powers(powers: Mapping[str, Power | None]) -> str:
 
 
 def _span(squares: FloatArray) -> tuple[float, float]:
-    """Return the shortest range of the turn that holds `MOST` of some squares."""
+    """Return the shortest range of the turn that holds `SHARE_IN_RANGE` of some squares."""
     n = squares.size
     running = np.concatenate([[0.0], np.cumsum(np.tile(squares, 2))])
-    need = MOST * running[n]
+    need = SHARE_IN_RANGE * running[n]
     stop = np.searchsorted(running, running[:n] + need, side="left")
     first = int(np.argmin(stop - np.arange(n)))
     step = float(GRID[1] - GRID[0])
@@ -150,7 +151,7 @@ def powers_of(conditions: Mapping[str, FloatArray], size: FloatArray) -> dict[st
         return {}
     columns = [np.log(each) for each in conditions.values()]
     matrix = np.stack([np.ones(size.size), *columns], axis=1)
-    response = np.log(np.maximum(size, max(LEAST * float(size.max()), TINY)))
+    response = np.log(np.maximum(size, max(LEAST_MISFIT_SHARE * float(size.max()), LEAST_MISFIT)))
     found = np.linalg.lstsq(matrix, response, rcond=None)[0]
     left = response - matrix @ found
     spread = np.linalg.pinv(matrix.T @ matrix) * float(left @ left) / free

@@ -17,7 +17,7 @@ MOMENT_SCALE = 10.0
 """By which Mz counts less than its misfit says, beside Fx or Fy."""
 _STEP = 1e-6
 _RANK = 1e-9
-_MOST, _MOST_OF_NORMAL = 0.9, 1.6449
+_QUANTILE, _NORMAL_QUANTILE = 0.9, 1.6449
 """Quantile of the size of a misfit, and that of a standard normal one."""
 
 
@@ -128,7 +128,7 @@ class BrushProblem:
         out = []
         for name in self.forces:
             error = getattr(found, name) - getattr(self.data, name)
-            out.append(np.nanquantile(np.abs(error), _MOST) / _MOST_OF_NORMAL)
+            out.append(np.nanquantile(np.abs(error), _QUANTILE) / _NORMAL_QUANTILE)
         scale = np.maximum(np.array(out), floor)
         moment = np.array([name == "Mz" for name in self.forces])
         if not moment.all():

@@ -20,7 +20,7 @@ from tirelib.identify.force_points import (
     noise_of,
 )
 
-LEAST, MOST, REACH = 12, 40, 3.0
+FEWEST_NEIGHBOURS, MOST_NEIGHBOURS, NEIGHBOUR_REACH = 12, 40, 3.0
 """Points of other cells that a plane is laid through: the nearest ones of a sparse plan, where the
 force bends between more, and up to so many within a distance in cells where a sweep is dense.
 `build/force_noise.py` measures what half and double of each do."""
@@ -62,11 +62,12 @@ def _within(points: ForcePoints, force: FloatArray) -> tuple[FloatArray, float]:
             continue
         middle = place[member].mean(axis=0)
         # a cell's own points would hide their noise in the plane
-        count = min(MOST + member.size, len(points))
+        count = min(MOST_NEIGHBOURS + member.size, len(points))
         far, near = (np.asarray(found) for found in tree.query(middle, k=count))
         others = points.cell[near] != points.cell[member[0]]
         far, near = far[others], near[others]
-        chosen = slice(0, min(MOST, max(LEAST, int(np.searchsorted(far, REACH)))))
+        within = int(np.searchsorted(far, NEIGHBOUR_REACH))
+        chosen = slice(0, min(MOST_NEIGHBOURS, max(FEWEST_NEIGHBOURS, within)))
         far, near = far[chosen], near[chosen]
         weight = np.clip(1.0 - (far / max(far[-1], 1e-12)) ** 3, 0.0, 1.0) ** 3
         gain = _plane(place[near] - middle, force[near], weight, steepest)

@@ -11,7 +11,7 @@ from tirelib.arrays import FloatArray
 from tirelib.effects import Effect
 from tirelib.errors import ParameterError
 
-MOST = 3
+MOST_SUSPECTS = 3
 """Suspects taken at most."""
 START = 0.1
 """Start of a strength where none is known, relative to the range."""
@@ -73,19 +73,20 @@ def suspects_of(told: Mapping[str, Any], catalogue: Mapping[str, Effect]) -> Sus
         every = dict.fromkeys(name for names in sets for name in names)
         differ = [name for name in every if not all(name in names for names in sets)]
         why = "the campaign cannot distinguish them"
-        return _of(differ[:MOST], common, entries, catalogue, False, why)
+        return _of(differ[:MOST_SUSPECTS], common, entries, catalogue, False, why)
     for name in named:
         twins = [twin["effect"] for twin in entries.get(name, {}).get("twins", [])]
         doubtful = [twin for twin in twins if twin in alive and twin not in named]
         if doubtful:
             others = [other for other in named if other != name]
-            why = f"{name} is named, and looks much like {' and '.join(doubtful[: MOST - 1])}"
-            chosen = [name, *doubtful][:MOST]
+            rivals = " and ".join(doubtful[: MOST_SUSPECTS - 1])
+            why = f"{name} is named, and looks much like {rivals}"
+            chosen = [name, *doubtful][:MOST_SUSPECTS]
             return _of(chosen, others, entries, catalogue, False, why)
     if named or not alive:
         return Suspects((), (), False, "nothing is in doubt")
-    why = f"no more than a hint: {', '.join(alive[:MOST])}"
-    return _of(alive[:MOST], [], entries, catalogue, True, why)
+    why = f"no more than a hint: {', '.join(alive[:MOST_SUSPECTS])}"
+    return _of(alive[:MOST_SUSPECTS], [], entries, catalogue, True, why)
 
 
 def _of(
@@ -142,8 +143,8 @@ def given_suspects(
             faults.append(f"{name} acts on strain, which {quantity} does not show")
         elif catalogue[name].untestable:
             faults.append(f"{name} cannot be tested: {catalogue[name].untestable}")
-    if not names or len(names) > MOST:
-        faults.append(f"{len(names)} effects are given; 1 to {MOST} are allowed")
+    if not names or len(names) > MOST_SUSPECTS:
+        faults.append(f"{len(names)} effects are given; 1 to {MOST_SUSPECTS} are allowed")
     if faults:
         raise ParameterError(f"suspects: {'; '.join(faults)}; correct --suspects")
     return _of(names, [], {}, catalogue, len(names) == 1, "given")

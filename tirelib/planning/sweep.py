@@ -13,7 +13,7 @@ from tirelib.arrays import FloatArray, IntArray
 from tirelib.errors import ParameterError
 from tirelib.identify.force_points import CELL_ANGLE, CELL_RATIO, ForcePoints, set_points
 
-LEAST = 4
+FEWEST_SLIPS = 4
 """Different slips that make a run one of several points."""
 SHARE = 0.5
 """Share of a campaign's points in such runs from which on they are its kind of run."""
@@ -75,7 +75,7 @@ def campaign_sweep(points: ForcePoints, name: str, wanted: bool | None = None) -
     """Return the slips of a campaign's runs, None if its runs are single points.
 
     A run is a stretch of points that follow each other at one load, pressure, camber and speed. It
-    is one of several points if it has `LEAST` slips. Where most of the points are in such runs,
+    is one of several points if it has `FEWEST_SLIPS` slips. Where most points are in such runs,
     the one with the most different slips is returned, each slip once in each direction.
 
     Parameters
@@ -94,7 +94,7 @@ def campaign_sweep(points: ForcePoints, name: str, wanted: bool | None = None) -
     several = [
         index
         for index in (np.flatnonzero(run == k) for k in range(int(run.max()) + 1))
-        if np.unique(cell[index]).size >= LEAST
+        if np.unique(cell[index]).size >= FEWEST_SLIPS
     ]
     if sum(index.size for index in several) > SHARE * len(points):
         chosen = max(several, key=lambda index: np.unique(cell[index]).size)

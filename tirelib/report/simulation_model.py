@@ -31,7 +31,7 @@ TURN = np.linspace(-np.pi, np.pi, N_ANGLES - 1, endpoint=False)
 """Angles of the curves, the last of which is the first; every fourth is one of `GRID`."""
 TRIAL = 0.02
 """Relative step of the load by which the slope of the deflection is found."""
-SETTLED, MOST = 1e-8, 30
+DEFLECTION_SETTLED, MOST_SOLVES = 1e-8, 30
 """Difference from the deflection that was asked for [m], and the solves until then."""
 
 
@@ -191,21 +191,22 @@ def _load_at(
     load = 1.2e5 * deflection  # a third less than a usual tire's 180 N/mm: an easy first solve
     more = load * (1.0 + TRIAL)
     before, now = depth(load), depth(more)
-    for _ in range(MOST):
+    for _ in range(MOST_SOLVES):
         slope = (now - before) / (more - load)
         step = (deflection - now) / np.where(slope > 0.0, slope, np.inf)
         load, before, more = more, now, np.clip(more + step, 0.5 * more, 2.0 * more)
-        if np.abs(deflection - now).max() < SETTLED:
+        if np.abs(deflection - now).max() < DEFLECTION_SETTLED:
             return load
         moved = more != load
         more = np.where(moved, more, load * (1.0 + 1e-9))
         now = depth(more)
+    off = float(np.abs(deflection - now).max())
     raise ConvergenceError(
         f"simulate: no load was found that deflects the model by {1e3 * deflection.max():.4g} mm; "
-        f"after {MOST} solves it is {1e3 * float(np.abs(deflection - now).max()):.2g} mm off; give "
-        "a smaller --deflection, or --load",
+        f"after {MOST_SOLVES} solves it is {1e3 * off:.2g} mm off; give a smaller --deflection, or "
+        "--load",
         more,
-        float(np.abs(deflection - now).max()),
+        off,
     )
 
 

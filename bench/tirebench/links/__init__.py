@@ -31,6 +31,8 @@ class Read(NamedTuple):
     source: int = 0
 
 
+SOCKETS = ("tcp://", "socket://", "udp://")
+"""How the address of a port in the network begins."""
 LOST, BACK, RESUMED = "lost", "back", "resumed"
 PASSED, DECODED = "decoding paused from here on", "decoded from here"
 """Between these two marks bytes were recorded but not decoded, because the machine was too busy."""

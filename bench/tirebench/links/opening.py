@@ -18,12 +18,11 @@ from importlib import import_module
 from typing import Any
 
 from tirebench.errors import DeviceError
-from tirebench.links import Link
+from tirebench.links import SOCKETS, Link
 from tirebench.protocols import CAN, SERIAL, SLCAN
 
 BITRATE = 500_000
 KINDS = ("slcan", "can")
-SOCKETS = ("tcp://", "socket://", "udp://")
 URLS = (*SOCKETS, "rfc2217://")
 _MODULES = {SERIAL: "serial_port", SLCAN: "slcan_port", CAN: "can_bus"}
 

@@ -5,8 +5,7 @@ python-can reads slcan byte by byte, which does not hold the rate of one wheel o
 
 from tirebench.deadline import Deadline
 from tirebench.errors import DeviceError
-from tirebench.links import Read
-from tirebench.links.opening import SOCKETS
+from tirebench.links import SOCKETS, Read
 from tirebench.links.serial_port import SerialLink
 from tirebench.links.socket_port import SocketLink
 from tirebench.protocols import SLCAN

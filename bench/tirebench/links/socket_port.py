@@ -8,8 +8,7 @@ from urllib.parse import urlsplit
 
 from tirebench.deadline import Deadline
 from tirebench.errors import DeviceError, LinkError, UnpluggedError
-from tirebench.links import Read
-from tirebench.links.opening import SOCKETS
+from tirebench.links import SOCKETS, Read
 from tirebench.links.serial_port import GATHER, LARGEST_BATCH
 from tirebench.protocols import SERIAL
 

@@ -8,7 +8,7 @@ import pytest
 from tests.unit.force_points import ANGLES, LOADS, MODEL, PRESSURES, VALUES
 from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
 from tirelib.diagnose.forces.diagnose import diagnose_force
-from tirelib.diagnose.forces.fit import Problem, fit_force
+from tirelib.diagnose.forces.fit import MeasuredForce, fit_force
 from tirelib.diagnose.forces.held_out import force_folds
 from tirelib.diagnose.forces.left import left_of
 from tirelib.diagnose.held_out import Fold, pooled
@@ -22,7 +22,7 @@ def problem(
     pressures: tuple[float, ...] = PRESSURES,
     friction_power: float = 0.0,
     noise: float = 5.0,
-) -> Problem:
+) -> MeasuredForce:
     grid = np.meshgrid(ANGLES, loads, pressures, [0, 1], indexing="ij")
     alpha, load, pressure, _ = (x.ravel() for x in grid)
     n = alpha.size
@@ -43,7 +43,7 @@ def problem(
         np.arange(n),
         np.full(n, 20.0),
     )
-    return Problem.of(MODEL.bench(force_points(data)), "Fy", noise)
+    return MeasuredForce.of(MODEL.bench(force_points(data)), "Fy", noise)
 
 
 def test_steady_runs_hold_out_their_highest_set_points() -> None:

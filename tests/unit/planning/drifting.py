@@ -8,7 +8,7 @@ from tests.unit.force_points import MODEL
 from tirelib.arrays import FloatArray
 from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
 from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.fit import Problem
+from tirelib.diagnose.forces.fit import MeasuredForce
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.force_points import force_points
 
@@ -58,5 +58,5 @@ def case(kind: str, size: float, seed: int = 3) -> ForceCase:
         np.full(n, 20.0),
         time=10.0 * np.arange(n),
     )
-    problem = Problem.of(MODEL.bench(force_points(data)), "Fy", NOISE)
+    problem = MeasuredForce.of(MODEL.bench(force_points(data)), "Fy", NOISE)
     return ForceCase("in order", MODEL, problem, problem, NOISE, n // 2, ())

@@ -16,7 +16,7 @@ from tirelib.compare.force_model import (
 from tirelib.compare.forces import UNITS
 from tirelib.diagnose.diagnose import FALSE_ALARM, Finding
 from tirelib.diagnose.forces.diagnose import ForceDiagnosis, diagnose_force
-from tirelib.diagnose.forces.fit import ForceFit, Problem
+from tirelib.diagnose.forces.fit import ForceFit, MeasuredForce
 from tirelib.diagnose.forces.left import ForceLeft, left_of
 from tirelib.diagnose.told import Assessed
 from tirelib.effects import Effect
@@ -51,9 +51,9 @@ class ForceCase:
     name : str
         Of the campaign.
     model : ForceModel
-    problem : Problem
+    problem : MeasuredForce
         At the points that are fitted.
-    whole : Problem
+    whole : MeasuredForce
         At all points: those that errors are told of.
     noise : float, [N] or [N m]
         Of a point; NaN without repeats.
@@ -63,8 +63,8 @@ class ForceCase:
 
     name: str
     model: ForceModel
-    problem: Problem
-    whole: Problem
+    problem: MeasuredForce
+    whole: MeasuredForce
     noise: float
     repeats: int
     messages: tuple[str, ...]
@@ -174,8 +174,8 @@ def _case(name: str, model: ForceModel, points: ForcePoints, quantity: str) -> F
             f"{len(whole)} points, passes of the sweep; one in {step} is fitted ({len(points)})"
         )
     noise, _, repeats = force_noise(whole, getattr(whole.data, quantity))
-    problem = Problem.of(model.bench(points), quantity, noise)
-    every = Problem.of(model.bench(whole), quantity, noise)
+    problem = MeasuredForce.of(model.bench(points), quantity, noise)
+    every = MeasuredForce.of(model.bench(whole), quantity, noise)
     return ForceCase(name, model, problem, every, noise, repeats, tuple(messages))
 
 

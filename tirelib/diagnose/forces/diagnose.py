@@ -7,7 +7,7 @@ import numpy as np
 
 from tirelib.arrays import FloatArray
 from tirelib.diagnose.diagnose import FALSE_ALARM, Finding, findings_of
-from tirelib.diagnose.forces.fit import ForceFit, Problem
+from tirelib.diagnose.forces.fit import ForceFit, MeasuredForce
 from tirelib.diagnose.forces.models import ForceModels, plain_tires
 from tirelib.diagnose.held_out import pooled
 from tirelib.effects import Effect
@@ -66,7 +66,7 @@ class ForceDiagnosis:
 
 @one_thread()
 def diagnose_force(
-    problem: Problem,
+    problem: MeasuredForce,
     values: Mapping[str, float],
     catalogue: Sequence[Effect],
     *,
@@ -80,7 +80,7 @@ def diagnose_force(
 
     Parameters
     ----------
-    problem : Problem
+    problem : MeasuredForce
     values : mapping
         Of the model's brush.
     catalogue : sequence of Effect

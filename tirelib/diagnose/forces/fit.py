@@ -20,12 +20,13 @@ MISFIT = 0.02
 START_SHARE = 0.3
 """Start of a strength, as a share of either end of where it may lie."""
 STEP = 1e-5
-MOST = 60
+MOST_STEPS = 60
+"""Steps of a fit, after which it is given up."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Problem:
-    """One force at points.
+class MeasuredForce:
+    """One measured force at points, and the bench that predicts it.
 
     Attributes
     ----------
@@ -46,8 +47,8 @@ class Problem:
     block: IntArray
 
     @classmethod
-    def of(cls, bench: ForceBench, quantity: str, noise: float) -> "Problem":
-        """Return the problem of a bench; `noise` may be NaN."""
+    def of(cls, bench: ForceBench, quantity: str, noise: float) -> "MeasuredForce":
+        """Return one force of the bench's points; `noise` may be NaN."""
         measured = getattr(bench.points.data, quantity)
         size = MISFIT * float(np.sqrt(np.mean(measured**2)))
         scale = float(np.hypot(size, noise if np.isfinite(noise) else 0.0))
@@ -56,9 +57,9 @@ class Problem:
     def __len__(self) -> int:
         return int(self.measured.size)
 
-    def take(self, chosen: IntArray | BoolArray) -> "Problem":
-        """Return the problem of some of the points, with the same scale."""
-        return Problem(
+    def take(self, chosen: IntArray | BoolArray) -> "MeasuredForce":
+        """Return some of the points, with the same scale."""
+        return MeasuredForce(
             self.bench.take(chosen),
             self.quantity,
             self.measured[chosen],
@@ -127,7 +128,7 @@ class ForceFit:
 
 
 def fit_force(
-    problem: Problem,
+    problem: MeasuredForce,
     values: Mapping[str, float],
     effects: Sequence[Effect] = (),
     strengths: Sequence[FloatArray] = (),
@@ -136,7 +137,7 @@ def fit_force(
 
     Parameters
     ----------
-    problem : Problem
+    problem : MeasuredForce
     values : mapping
         Start, and the parameters that stay.
     effects, strengths
@@ -189,12 +190,12 @@ def fit_force(
         xtol=1e-8,
         ftol=1e-9,
         gtol=1e-9,
-        max_nfev=MOST,
+        max_nfev=MOST_STEPS,
     )
     if found.status == 0:
         raise ConvergenceError(
             f"brush with {', '.join(e.name for e in chosen) or 'no effect'}: the fit does not "
-            f"settle in {MOST} steps; the model does not fit these data: look at them with "
+            f"settle in {MOST_STEPS} steps; the model does not fit these data: look at them with "
             "`tirelib compare`",
             moved_constants(values, names, found.x[: len(names)]),
             float(found.optimality),
@@ -214,7 +215,7 @@ def fit_force(
     )
 
 
-def with_effect(problem: Problem, model: ForceFit, effect: Effect) -> ForceFit:
+def with_effect(problem: MeasuredForce, model: ForceFit, effect: Effect) -> ForceFit:
     """Return the fit with one effect more: the better of two starts, one to each side.
 
     Raises
@@ -257,7 +258,7 @@ def _covariance(rows: FloatArray, rest: FloatArray, block: IntArray) -> FloatArr
 
 
 def _bounds(
-    problem: Problem,
+    problem: MeasuredForce,
     values: Mapping[str, float],
     names: Sequence[str],
     effects: Sequence[Effect],
@@ -279,7 +280,9 @@ def _bounds(
     return low, high
 
 
-def room(problem: Problem, values: Mapping[str, float], effect: Effect) -> tuple[float, float]:
+def room(
+    problem: MeasuredForce, values: Mapping[str, float], effect: Effect
+) -> tuple[float, float]:
     """Return strengths between which an effect is fitted: its range, and beyond if computable."""
     ends = []
     for end, sign in ((effect.low, -1.0), (effect.high, 1.0)):

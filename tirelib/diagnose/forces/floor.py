@@ -2,14 +2,16 @@
 
 import numpy as np
 
-from tirelib.diagnose.forces.fit import ForceFit, Problem
+from tirelib.diagnose.forces.fit import ForceFit, MeasuredForce
 from tirelib.identify.span import span
 from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.null import PRIOR
 from tirelib.infer.plain import BASE, ROUGHLY
 
 
-def force_floor(problem: Problem, fit: ForceFit, hypothesis: Hypothesis, alpha: float) -> float:
+def force_floor(
+    problem: MeasuredForce, fit: ForceFit, hypothesis: Hypothesis, alpha: float
+) -> float:
     """Return the part of a fitted brush's rms that noise and what plain tires show explain, SI.
 
     It is all of it unless the hypothesis is rejected; then it is what is left when the model takes
@@ -17,7 +19,7 @@ def force_floor(problem: Problem, fit: ForceFit, hypothesis: Hypothesis, alpha: 
 
     Parameters
     ----------
-    problem : Problem
+    problem : MeasuredForce
     fit : ForceFit
     hypothesis : Hypothesis
         That the fit's effects and no other are there.

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force
+from tirelib.diagnose.forces.fit import ForceFit, MeasuredForce, fit_force
 from tirelib.diagnose.held_out import Fold
 from tirelib.errors import TirelibError
 from tirelib.identify.force_points import set_points
@@ -27,7 +27,7 @@ _TOP = 0.8
 """Quantile from which a condition without set points counts as high."""
 
 
-def force_folds(problem: Problem) -> tuple[Fold, ...]:
+def force_folds(problem: MeasuredForce) -> tuple[Fold, ...]:
     """Return what a campaign allows to leave out."""
     points = problem.bench.points
     found: list[Fold] = []
@@ -51,7 +51,7 @@ def force_folds(problem: Problem) -> tuple[Fold, ...]:
     return (*good, *(fold for fold in cells if _usable(problem, fold)))
 
 
-def _usable(problem: Problem, fold: Fold) -> bool:
+def _usable(problem: MeasuredForce, fold: Fold) -> bool:
     """Whether enough is left out, and enough is left to fit."""
     out, n = int(fold.out.sum()), len(problem)
     if out < 3 or n - out < LEAST_POINTS:
@@ -77,12 +77,12 @@ def _highest(name: str, values: FloatArray) -> BoolArray:
     return np.asarray(values >= np.quantile(values, _TOP))
 
 
-def _still(problem: Problem, fold: Fold) -> bool:
+def _still(problem: MeasuredForce, fold: Fold) -> bool:
     """Whether the condition still varies without the fold: else a law over it would be free."""
     return varies(problem.bench.conditions.take(~fold.out), fold.name)
 
 
-def errors_of(problem: Problem, fit: ForceFit, folds: Sequence[Fold]) -> tuple[float, ...]:
+def errors_of(problem: MeasuredForce, fit: ForceFit, folds: Sequence[Fold]) -> tuple[float, ...]:
     """Return a model's rms on each fold's points after a fit to the others, [N] or [N m].
 
     The fitted model is the start. NaN where the fit does not settle or the model fails there.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray
-from tirelib.diagnose.forces.fit import ForceFit, Problem
+from tirelib.diagnose.forces.fit import ForceFit, MeasuredForce
 from tirelib.diagnose.left import FLAT, Power, powers_of
 from tirelib.model.brush import BrushConditions
 from tirelib.problems.force_plan import varies
@@ -49,7 +49,7 @@ class ForceLeft:
     guess: str | None
 
 
-def left_of(problem: Problem, model: ForceFit) -> ForceLeft:
+def left_of(problem: MeasuredForce, model: ForceFit) -> ForceLeft:
     """Return what a fitted model leaves of the force that it was fitted to."""
     residual = model.predicted - problem.measured
     # without the effects
@@ -82,7 +82,7 @@ def _powers(at: BrushConditions, size: FloatArray) -> dict[str, Power]:
     return powers_of({name: getattr(at, name) for name in names}, size)
 
 
-def _guess(problem: Problem, model: ForceFit, residual: FloatArray) -> str | None:
+def _guess(problem: MeasuredForce, model: ForceFit, residual: FloatArray) -> str | None:
     """Return the product of a slip term and a condition that explains most on other points."""
     if len(problem) < 40:
         return None

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tirelib.diagnose.forces.fit import ForceFit, Problem, fit_force, with_effect
+from tirelib.diagnose.forces.fit import ForceFit, MeasuredForce, fit_force, with_effect
 from tirelib.diagnose.forces.floor import force_floor
 from tirelib.diagnose.forces.held_out import errors_of, force_folds
 from tirelib.effects import Effect
@@ -31,7 +31,7 @@ class ForceModels:
 
     Parameters
     ----------
-    problem : Problem
+    problem : MeasuredForce
         What is fitted.
     given : ForceProblem
         The same force as the inference sees it, about the brush as its file has it.
@@ -48,7 +48,7 @@ class ForceModels:
 
     def __init__(
         self,
-        problem: Problem,
+        problem: MeasuredForce,
         given: ForceProblem,
         false_alarm: float,
         hypotheses: Hypotheses | None = None,
