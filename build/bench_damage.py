@@ -68,9 +68,9 @@ class Outcome:
     wrong : int
         Frames that arrived and were never sent so, or not in this block.
     counts : LineCounts
-        Of the decoder.
+        What the decoder has counted.
     growth : int, [bytes]
-        Of the process's largest memory, from the first tenth to the end.
+        Growth of the process's largest memory, from the first tenth to the end.
     """
 
     sent: int = 0
@@ -95,7 +95,7 @@ class Line(Protocol):
     keys : list
         What each frame says.
     counts : LineCounts
-        Of the decoder.
+        What the decoder has counted.
     """
 
     keys: list[Hashable]

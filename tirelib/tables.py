@@ -34,7 +34,7 @@ def feature_table(observed: "Observations") -> "pd.DataFrame":
     Parameters
     ----------
     observed : Observations
-        Of n turns, from `tirelib.observe`.
+        Observations of n turns, from `tirelib.observe`.
 
     Returns
     -------
@@ -55,9 +55,9 @@ def estimate_table(observed: "Observations", estimates: "Estimates") -> "pd.Data
     Parameters
     ----------
     observed : Observations
-        Of n turns.
+        Observations of n turns.
     estimates : Estimates
-        Of the same turns.
+        Estimates of the same turns.
 
     Returns
     -------

@@ -29,7 +29,7 @@ class Balance:
     ----------
     u : shape (n, 2)
     height, rolling : float
-        Of the axle over the road, and V / omega [m].
+        Height of the axle over the road, and V / omega [m].
     omega : float
         [rad/s]
     residual : shape (2 n,)

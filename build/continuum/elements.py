@@ -81,7 +81,7 @@ def line_work(
     Parameters
     ----------
     weight : shape (E, Q)
-        Of the Gauss points.
+        Weights of the Gauss points.
     force : shape (E, Q, 2)
         On the tire, per weight.
     by_value, by_slope : shape (E, Q, 2, 2)

@@ -25,7 +25,7 @@ class Grid:
         Number of nodes.
     bulk : Bulk
     layer, strip : shape (E,)
-        Of each element of `bulk`.
+        Layer and strip of each element of `bulk`.
     gage, carcass, back, surface : Line
         Innerliner, inner and outer face of the belt, and tread surface; the elements of a strip
         stand together.

@@ -119,9 +119,9 @@ def solve_arch(arch: Arch) -> tuple[Array, Array, Array]:
     Returns
     -------
     force : shape (pressures, edges)
-        Of two sidewalls on the belt, outward, per circumference [N/m].
+        Outward force of two sidewalls on the belt, per circumference [N/m].
     tension, tangential : shape (pressures,)
-        Of the meridian at the belt's edge [N/m], and k_v [N/m^2], both at w = 0.
+        Tension of the meridian at the belt's edge [N/m], and k_v [N/m^2], both at w = 0.
     """
     phi = np.linspace(-np.pi / 2.0 - arch.upper, -np.pi / 2.0 + arch.lower, ELEMENTS + 1)
     inner = arch.radius

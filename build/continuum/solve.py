@@ -71,7 +71,7 @@ def solve(model: Model, cond: Condition, start: State | None = None) -> State:
     Parameters
     ----------
     start : State, optional
-        Of a tire with the same mesh, near by; without one the tire is lowered on to the road.
+        State of a tire with the same mesh, near by; without one the tire is lowered on to the road.
 
     Raises
     ------

@@ -36,7 +36,7 @@ class Tire:
     ----------
     name : str
     ring_radius, belt_width : float
-        Of the belt's middle line, not inflated; width of belt, tread and pressure [m].
+        Radius of the belt's middle line, not inflated; width of belt, tread and pressure [m].
     extension, bending, shear : float
         EA [N], EI [N m^2] and GA [N] of the belt layer, which fix its thickness and moduli.
     innerliner_offset : float

@@ -54,7 +54,7 @@ class Braking:
     friction : callable
         Its scale for each wheel, by the way since the brakes were put on.
     steer : float, [rad]
-        Of the front wheels.
+        Angle of the front wheels.
     rolling : float, [s]
         Time before the brakes: two turns of every wheel, and the turn settles.
     holds : bool

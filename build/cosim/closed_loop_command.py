@@ -28,7 +28,7 @@ def run_study(
     about : str, optional
         Shown by ``--help``.
     name : str
-        Of the JSON file, and of the folder below ``build/out``.
+        Name of the JSON file, and of the folder below ``build/out``.
     find : callable
         Takes the virtual tire's FMU, the strain tire's, and what shows the progress.
     document, page : callables

@@ -62,7 +62,7 @@ class OncePerTurn:
     Parameters
     ----------
     start_angles : sequence of 4 floats, [rad]
-        Of the gages; 0: over the road.
+        Angles at which the gages begin; 0: over the road.
     """
 
     def __init__(self, start_angles: Sequence[float]) -> None:

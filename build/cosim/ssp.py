@@ -70,7 +70,7 @@ class System:
     components : sequence of Component
     links : sequence of Link
     step, stop : float, [s]
-        Of the default experiment.
+        Step and end of the default experiment.
     """
 
     name: str

@@ -94,7 +94,7 @@ class Controls:
     Attributes
     ----------
     steer_rate : float, [rad/s]
-        Of the front wheels, to the left positive; the model limits it to 0.4 rad/s.
+        Rate of the front wheels, to the left positive; the model limits it to 0.4 rad/s.
     torque : sequence of 4 floats, [N m]
         At each wheel in the order of `WHEELS`; driving positive, braking negative. Brakes hold a
         wheel that stands; they do not turn it back.
@@ -120,7 +120,7 @@ class Motion:
     speed : float, [m/s]
         Along the vehicle's x axis.
     steer : float, [rad]
-        Of the front wheels, to the left positive.
+        Angle of the front wheels, to the left positive.
     heading, yaw_rate : float, [rad], [rad/s]
         To the left positive.
     roll, side_slip : float, [rad]

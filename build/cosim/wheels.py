@@ -125,7 +125,7 @@ class Estimates:
     Fz, alpha, kappa, Fy : array, [N], [rad], [1], [N]
     Fz_std, alpha_std, kappa_std, Fy_std : array
     turn_rate : array, [rad/s]
-        Of the turn before the contact, from the strain alone.
+        Mean over the turn before the contact, from the strain alone.
     contact_time : array, [s]
         Middle of the contact that the estimate is of, on the vehicle's clock.
     valid, Fz_valid, alpha_valid, kappa_valid, Fy_valid : bool array
@@ -184,7 +184,7 @@ class VirtualTire:
     ----------
     path : path
     name : str
-        Of the instance.
+        Name of the instance.
     """
 
     def __init__(self, path: Path, name: str) -> None:
@@ -261,7 +261,7 @@ class FourWheels:
     noise : float
         Standard deviation of the gages' noise, as strain.
     seed : int
-        Of noise; the wheels get seed .. seed + 3.
+        Seed of the noise; the wheels get seed .. seed + 3.
     start_angles : sequence of 4 floats, [rad]
         Where the gages of each wheel stand at time zero: contacts of the wheels are not in step.
     parameters : dict, optional

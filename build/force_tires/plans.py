@@ -20,7 +20,7 @@ from tirelib.identify.force_data import ForceData
 RATE, PERIOD, PAUSE = 12.0, 12.0, 8.0
 """Samples a second, length of a sweep and pause after it [s]."""
 ANGLE_OFF, LOAD_OFF, PRESSURE_OFF = 2e-4, 0.003, 0.003
-"""Of a run, alike in all its samples: slip angle [rad], load and pressure (relative)."""
+"""Errors of a run, alike in all its samples: slip angle [rad], load and pressure (relative)."""
 DRIFT = 0.007
 """Rms of the drift of friction, and of stiffness, over a campaign."""
 LATE = 0.005

@@ -37,7 +37,7 @@ class Day:
     delay : float
         Between trigger and gages [s].
     angle : float
-        Of an effect that is fixed to the tire [rad].
+        Place of an effect that is fixed to the tire [rad].
     """
 
     seed: int

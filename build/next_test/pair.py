@@ -34,7 +34,7 @@ class PairCase:
     Attributes
     ----------
     seed : int
-        Of the tire.
+        Number of the tire.
     plan, truth, rival : str
     visible : float
         Chi-square by which the campaign alone shows the effect, against none.

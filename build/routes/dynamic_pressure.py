@@ -44,7 +44,7 @@ class PressureMap:
     pressure : shape (n_points, n), [N/m]
         Per length of belt, inward positive.
     traction : shape (n_points, n), [N/m]
-        Of the road on the tread along +phi; zero for the radial contact.
+        Traction of the road on the tread along +phi; zero for the radial contact.
     centre : shape (n_points,), [m]
         Centre of pressure along the belt, negative toward the entry.
     length : shape (n_points,), [m]

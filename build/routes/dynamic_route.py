@@ -53,7 +53,7 @@ class DynamicRoute:
         radial_stiffness and tangential_stiffness at each pressure, radial_deflection_rate,
         bending_stiffness, tread_stiffness, and the pressure slopes.
     names : tuple of str
-        Of the rows of `correlation`.
+        Names of the rows of `correlation`.
     correlation : shape (n, n)
     pressures : shape (n_levels,), [Pa]
     edges : Edges
@@ -67,7 +67,7 @@ class DynamicRoute:
     damping_modal : Damping or None
         The same shift by the modal law, Eq. (107), which the models of `tirelib.model` have.
     turn_rate : float, [rad/s]
-        Of the fastest run.
+        Turn rate of the fastest run.
     reasons : tuple of str
         Why something is missing.
     values : mapping
@@ -101,7 +101,7 @@ def dynamic_route(
     Parameters
     ----------
     runs : StraightRuns
-        Of `straight_runs(waves)`, which has checked gages and geometry.
+        What `straight_runs(waves)` has chosen, which has checked gages and geometry.
     start : TireFile
         Geometry, mass, start values and priors (`start_file`); a bending stiffness from
         `ring.frequency_fit.fit_stiffness` or a tread stiffness E b / tau (Eq. 111) with its

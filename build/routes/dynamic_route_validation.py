@@ -140,12 +140,12 @@ def rim_checks(
     Parameters
     ----------
     values : mapping
-        Of a tire, sidewall at its reference pressure with slopes.
+        Numbers of a tire, sidewall at its reference pressure with slopes.
     pressure : float, [Pa]
     shift, turn, longitudinal : float, optional
         Measured S_v [N/m], S_theta [N m/rad], K_x [N/m].
     half_angle : float, optional, [rad]
-        Of the contact in the longitudinal test, for the tread's part; left out where not given.
+        Half contact in the longitudinal test, for the tread's part; left out where not given.
     """
     above = pressure - values["pressure"]
     k_u = values["radial_stiffness"] + values["radial_pressure_slope"] * above

@@ -260,7 +260,7 @@ def edge_bias(
     Parameters
     ----------
     values : mapping
-        Of a tire.
+        Numbers of a tire.
     points : Operating
     plausible : mapping of str to float
         Relative standard deviation by parameter; the default is `PLAUSIBLE`.
@@ -328,7 +328,7 @@ def corrected(
     reading : EdgeReading
     bias : EdgeBias
     angle_std : shape (n_runs,), [rad]
-        Of the angle's zero; infinite without a trigger.
+        Standard deviation of the angle's zero; infinite without a trigger.
     """
     noise = np.nan_to_num(reading.noise)
     shift = 0.5 * bias.bias.sum(axis=1)

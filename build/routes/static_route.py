@@ -93,7 +93,7 @@ class StaticRoute:
     ----------
     run : shape (n_loads,)
     pressure, speed : float, [Pa], [m/s]
-        Of the series.
+        Condition of the series.
     strain_based : tuple of Quantity
         bending_stiffness, radial_stiffness (A), radial_deflection_rate (B), then n_p and S_f of
         each load; the first three with intervals by profile.
@@ -104,7 +104,7 @@ class StaticRoute:
     misfit : shape (n_loads,), [m]
         Rms difference of the deformations, strain-based.
     load_error : shape (n_loads,)
-        Of the conventional route, relative.
+        Relative error of the load by the conventional route.
     edges : Edges
     lengths : ContactLengths
     pressures : tuple of PressureShape
@@ -138,7 +138,7 @@ def static_route(
     start : TireFile
         Geometry, start values and priors.
     values : mapping, optional
-        Of a tire known better (the dynamic route's), for the bias of the edges' reading.
+        Numbers of a tire known better (the dynamic route's), for the bias of the edges' reading.
 
     Raises
     ------

@@ -33,7 +33,7 @@ class Parameter:
     scaled : bool
         Moves by factors (positive numbers), else by differences.
     prior_std : float
-        Of the logarithm for scaled ones, about the start; infinite is no prior.
+        Deviation of the logarithm for scaled ones, about the start; infinite is no prior.
     """
 
     name: str
@@ -91,15 +91,15 @@ class FewFit:
     x : shape (n,)
         Coordinates at the solution.
     covariance, correlation : shape (n, n)
-        Of the coordinates.
+        Covariance and correlation of the coordinates.
     residual : shape (m,)
         At the solution, in standard deviations, without priors.
     cost : float
         Sum of squares, priors included.
     jacobian : shape (m, n)
-        Of the residuals, without priors.
+        Slopes of the residuals, without priors.
     inverse : shape (n, n)
-        Of the normal matrix, priors included.
+        Inverse of the normal matrix, priors included.
     """
 
     parameters: tuple[Parameter, ...]

@@ -62,9 +62,9 @@ class Line:
     spawn : callable
         Starts programs.
     folder : Path
-        Of the port's name and of the file that lets the wheel begin.
+        Folder of the port's name and of the file that lets the wheel begin.
     arguments : object
-        Of ``tirebench emulate``.
+        Arguments of ``tirebench emulate``.
     """
 
     def __init__(self, spawn: Callable[..., Program], folder: Path, *arguments: object) -> None:

@@ -114,7 +114,7 @@ class Steps:
     Parameters
     ----------
     folder : Path
-        Of the campaign.
+        Folder of the campaign.
     out : Path
         Where models and pages go.
     effect_files : tuple of Path
@@ -139,7 +139,7 @@ class Steps:
         Raises
         ------
         TirelibError
-            Of any verb but `add`, whose reason becomes a message.
+            If any verb but `add` fails; a failure of `add` becomes a message.
         """
         from tirelib.journey import compare
         from tirelib.parameters import read_tire

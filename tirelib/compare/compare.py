@@ -41,7 +41,7 @@ def compare(
     effects : mapping
         By name, as the model's file names them.
     waves : Waveforms, optional
-        Of the campaign, when they have been read already.
+        Waveforms of the campaign, when they have been read already.
     progress : callable, optional
         Called with a label after each run.
 

@@ -45,9 +45,9 @@ class ModelError:
     unit : str
         noise, or ustrain without repeats.
     noise : float, [-]
-        Of a run's mean waveform; NaN without repeats.
+        Standard deviation of a run's mean waveform by noise; NaN without repeats.
     rms : float, [-]
-        Of model less measured, the delay taken out, set points left in.
+        Rms of model less measured, the delay taken out, set points left in.
     delay, delay_std : float, [s]
         Delay of the gages against the trigger.
     prediction : Prediction
@@ -107,7 +107,7 @@ class Yardstick:
     noise : float, [-]
         NaN without repeats.
     lateral : tuple of float, [m]
-        Of the gages in use.
+        Places of the gages in use.
     low_pass : LowPass
     """
 
@@ -159,7 +159,7 @@ class Yardstick:
             That of the runs to which the model was fitted, where these are others; it is fitted
             here by default.
         start : Rolling or Unknowns, optional
-            Of these runs and a model nearby; saves time, the result is the same.
+            Solution of these runs by a model nearby; saves time, the result is the same.
 
         Raises
         ------

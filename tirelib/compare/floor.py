@@ -47,11 +47,11 @@ def floor_of(model: Model, data_hash: str, error: ModelError, points: Operating)
     ----------
     model : Model
     data_hash : str
-        Of the campaign: a floor on other data is none here.
+        Hash of the campaign: a floor on other data is none here.
     error : ModelError
-        Of the counted runs.
+        Error on the counted runs.
     points : Operating
-        Of the same runs.
+        The same runs.
     """
     smooth, share = float("nan"), float("nan")
     if error.whiten is not None:

@@ -26,7 +26,7 @@ class Curve:
     member : shape (n,)
         Numbers of the points, by rising slip.
     rms : float
-        Of model less measured, in the unit of the force.
+        Rms of model less measured, in the unit of the force.
     words : str
     """
 

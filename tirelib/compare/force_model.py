@@ -31,7 +31,7 @@ class ForceModel:
     name : str
     brush : BrushModel
     used : tuple of UsedEffect
-        Of stage brush.
+        Effects of stage brush.
     reference : (load, pressure), [N], [Pa]
         At which laws of load and pressure change nothing.
     history : tuple of mapping

@@ -59,7 +59,7 @@ class ForceCell:
         Range, SI.
     points : int
     rms, mean : float
-        Of model less measured.
+        Rms and mean of model less measured.
     excess, excess_std : float
         Mean of how much the model's size exceeds the measured, and its standard deviation from
         repeats (NaN without).
@@ -85,7 +85,7 @@ class ForceComparison:
     ----------
     quantity : str
     name : str
-        Of the campaign.
+        Name of the campaign.
     model : str
     data : ForceData
         Means over cells.
@@ -93,7 +93,7 @@ class ForceComparison:
         Number of the run or stretch.
     measured, predicted : shape (n,)
     noise : float
-        Of a point, from repeats; NaN without.
+        Standard deviation of a point, from repeats; NaN without.
     repeats : int
         Cells with more than one point.
     error : float

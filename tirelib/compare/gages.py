@@ -53,9 +53,9 @@ class Gage:
     lateral : float, [m]
         Left positive.
     noise : RepeatNoise
-        Of this gage alone.
+        Noise of this gage alone.
     rms : float, [-]
-        Of model less measured, set points taken out.
+        Rms of model less measured, set points taken out.
     table : tuple of Cell
         By sector.
     departure : Departure or None

@@ -45,7 +45,7 @@ class Model:
     ----------
     name : str
     values : mapping
-        Of `Tire`, SI.
+        Numbers of `Tire`, SI.
     used : tuple of UsedEffect
     large : bool
         Whether the correction for large displacements belongs to it.
@@ -173,12 +173,12 @@ class Prediction:
     strain : shape (n_runs, n_phi), [-]
         Mean over the gages, filtered as the measurement is.
     gages : shape (n_runs, n_gages, n_phi), [-]
-        Of each gage; equal for all gages where no effect tells them apart.
+        Waveform of each gage; equal for all gages where no effect distinguishes them.
     by_load, by_pressure : shape (n_runs, n_phi), [-]
         Slopes of `strain` by relative load and relative pressure.
     deflection, deflection_by_load : shape (n_runs,), [m]
     edges : shape (n_runs, 2), [rad]
-        Of the contact, entry < 0 < exit.
+        Edges of the contact, entry < 0 < exit.
     """
 
     strain: FloatArray
@@ -207,9 +207,9 @@ def predict_runs(
     lateral : sequence of float, [m]
         Positions of the gages that are averaged (left positive).
     low_pass : LowPass
-        Of the measured waveforms.
+        Filter of the measured waveforms.
     start : Rolling or Unknowns, optional
-        Of the same points and a model nearby; saves time, the result is the same.
+        Solution of the same points by a model nearby; saves time, the result is the same.
 
     Raises
     ------

@@ -73,7 +73,7 @@ def plot_data(
 
     Returns
     -------
-    Of strain, over runs and `GRID` [deg]: measured, model, difference [ustrain], white (whitened
+    For strain, over runs and `GRID` [deg]: measured, model, difference [ustrain], white (whitened
     residual, in noise), by_gage and measured_by_gage (runs, gages, angles); of forces, over points.
     `level_CONDITION` numbers the set points, so that points within the rig's scatter have one
     number. `trace_NAME` has the shape of the difference; `fault_NAME` tells why there is none.

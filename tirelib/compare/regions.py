@@ -49,7 +49,7 @@ class Region:
     p : float
         Chance that noise and set points alone give such a difference somewhere.
     share : float
-        Of the squares of all differences.
+        Share of the squares of all differences.
     measured : float, [-]
         Mean measured strain there.
     member : shape (n_runs,)
@@ -89,8 +89,8 @@ class _Subset:
 def subsets(counted: BoolArray, factors: Sequence[Factor]) -> list[_Subset]:
     """Return all counted runs, and those above and below each level of each condition.
 
-    Of the signed slips, the ranges away from zero on either side; with them alone there is no
-    subset of all runs.
+    Signed slips give the ranges away from zero on either side; with them alone there is no subset
+    of all runs.
     """
     every = _Subset("all", "", np.nan, counted)
     out = [] if factors and all(factor.name in SLIPS for factor in factors) else [every]

@@ -59,12 +59,12 @@ class Cell:
     by : str
         Condition, or "all".
     value : float
-        Of the level, SI; NaN for "all".
+        Value of the level, SI; NaN for "all".
     sector : str
     runs : int
     rms, mean : float, [-]
     std : float, [-]
-        Of the mean, from repeats and set points; NaN without repeats.
+        Standard deviation of the mean, from repeats and set points; NaN without repeats.
     """
 
     by: str

@@ -40,7 +40,7 @@ class SetPoints:
     tolerance : shape (n_runs, 4)
         Their standard deviations by the rig.
     covariance : shape (n_runs, 5, 5)
-        Of the prediction, the zero last.
+        Covariance of the prediction, the zero last.
     tangent : shape (n_runs, n_phi, 5), [-]
         Slopes of the waveform by them and by the zero.
     shift : shape (n_runs, n_phi), [-]
@@ -84,7 +84,7 @@ def predict_set_points(
     tangent : shape (n_runs, n_phi, 5)
     scale : shape (n_runs, 4)
     noise : float, [-]
-        Of the repeats, the least that s can be; NaN where unknown.
+        Noise of the repeats, the least that s can be; NaN where unknown.
     """
     n = rest.shape[1]
     least = LEAST_NOISE if np.isnan(noise) else max(noise, LEAST_NOISE)

@@ -42,7 +42,7 @@ class Fit:
     rms : float, [-]
         Rms of model less measured, set points and delay taken out.
     strain_rms : float, [-]
-        Of the measurement.
+        Rms of the measurement.
     p : float
         Chance of such an error if only noise and set points differ (F test); NaN without repeats.
     beyond : tuple of str

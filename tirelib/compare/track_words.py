@@ -29,9 +29,9 @@ class TrackFit:
     ----------
     runs : int
     mean, std : float
-        Of model less measured, and its standard deviation by noise and set points.
+        Mean of model less measured, and its standard deviation by noise and set points.
     rms : float
-        Of model less measured.
+        Rms of model less measured.
     rms_beside : float
         The same with the mean, a constant offset, taken out.
     """

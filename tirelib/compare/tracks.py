@@ -30,7 +30,7 @@ class Track:
     model_std : shape (n_runs,), SI
         By the tolerance of the set points.
     noise : float, SI
-        Of the measured number, from repeats; NaN without.
+        Noise of the measured number, from repeats; NaN without.
     freedom : int
         Degrees of freedom of the noise.
     constant : bool

@@ -45,7 +45,7 @@ class Finding:
     strength, std : shape (components,)
     in_range : bool
     share : float
-        Of the squared error, what this effect alone takes away, to first order.
+        Part of the squared error that this effect alone takes away, to first order.
     twins : tuple of (name, angle [rad])
     power : float
         Chance that a third of the range has a score beyond the threshold.
@@ -140,7 +140,7 @@ def diagnose(
     ----------
     runs : StraightRuns
     values : mapping
-        Of the model's tire.
+        Numbers of the model's tire.
     catalogue : sequence of Effect
     effects, strengths
         That the model has already.

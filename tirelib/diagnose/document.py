@@ -31,7 +31,7 @@ class Assessment(Assessed):
     given : Model
         The model that was diagnosed, as its file has it.
     before, refitted, after : ModelError
-        Of the model as it is given, with the numbers of the least error, and with the named
+        Errors of the model as it is given, with the numbers of the least error, and with the named
         effects.
     left : Left
         What no effect explains.

@@ -87,7 +87,7 @@ class Fitted:
 
     @property
     def covariance(self) -> FloatArray:
-        """Of the tire's coordinates, the delay, and strengths in ranges, (n, n)."""
+        """Covariance of the tire's coordinates, the delay, and strengths in ranges, (n, n)."""
         return self.hypothesis.fit.covariance
 
     def without_runs(self, out: BoolArray) -> tuple[Model, float]:

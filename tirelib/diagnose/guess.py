@@ -87,10 +87,10 @@ def guess_law(
     rest : shape (n_runs, n_phi), [-]
         Measured less model.
     waveform : shape (n_runs, n_phi), [-]
-        Of the model.
+        Waveforms of the model.
     points : Operating
     edges : shape (n_runs, 2), [rad]
-        Of the contact.
+        Edges of the contact.
     turned : callable
         Takes waveforms (..., n_runs, n_phi) to what structure and fit leave of them, whitened.
     """

@@ -72,7 +72,7 @@ def held_out(model: Fitted, fold: Fold, yardstick: Yardstick) -> ModelError | No
         Its effects stay.
     fold : Fold
     yardstick : Yardstick
-        Of the campaign: the unit is that of every other error of it.
+        Yardstick of the campaign: the unit is that of every other error of it.
     """
     try:
         trained, delay = model.without_runs(fold.out)

@@ -55,7 +55,7 @@ class Left:
     powers : mapping of condition to Power or None
         None where the plan does not vary it.
     edges : shape (n_runs, 2), [rad]
-        Of the contact.
+        Edges of the contact.
     """
 
     white: FloatArray

@@ -56,7 +56,7 @@ def estimate_recording(recording: Recording, calibration: Calibration) -> Iterat
     ----------
     recording : Recording
     calibration : Calibration
-        Of the tires of all wheels.
+        Calibration of the tires of all wheels.
 
     Raises
     ------

@@ -44,7 +44,7 @@ def moved_by(value: FloatArray, angle_std: FloatArray) -> tuple[FloatArray, Floa
     Parameters
     ----------
     value : array, shape (3 n, ...)
-        Of `with_moved`.
+        What was computed from the features of `with_moved`.
     angle_std : array, shape (n,), [1]
 
     Returns

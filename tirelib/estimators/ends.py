@@ -42,7 +42,7 @@ class End:
     uncertain, beyond : arrays, shape (m,), unit of y squared
         Leverage, and how far it exceeds that of the rows that stayed.
     noise : float, unit of y
-        Of that fit.
+        Noise of that fit.
     """
 
     rows: BoolArray
@@ -103,7 +103,7 @@ def growth(
     Parameters
     ----------
     errors : arrays, shape (m,)
-        Of each set that was left out, by a fit that never saw it.
+        Errors of each set that was left out, by a fit that never saw it.
     inside, beyond : arrays, shape (m,)
         Variance without growth, and leverage beyond `Border.near`; unit of y squared.
     """

@@ -50,7 +50,7 @@ def compute_regressors(features: Features, gages: Sequence[int]) -> dict[str, Fl
         ``contact_angle`` [rad] mean contact angle; ``compression`` mean of CP1 and CP2 over TP;
         ``traction`` (CP1 - CP2) / TP; ``tension`` mean TP [strain]; ``cp1_slope``, ``cp2_slope``,
         ``tp_slope`` slopes over TP; ``angle_slope`` [rad]; ``omega`` [rad/s] and the conditions.
-        Of the shape: ``angle_bow`` [rad], ``tp_bow``, ``cp1_bow``, ``cp2_bow`` over TP, NaN for
+        The shape gives ``angle_bow`` [rad], ``tp_bow``, ``cp1_bow``, ``cp2_bow`` over TP, NaN for
         fewer than three gages; ``fullness`` E_vertical over TP [rad], ``skew`` [rad]; ``steepness``
         mean of the peak rates at both edges over TP and ``steepness_change`` leading less trailing
         [1/rad]; ``lead_bend``, ``trail_bend`` from each edge to its compressive peak [rad].

@@ -39,7 +39,7 @@ class Ridge:
     size : array, shape (k,)
         By which the columns of x were divided.
     penalty : float
-        Of the squared coefficients in those columns, per unit of squared error of a row.
+        Weight of the squared coefficients in those columns, per unit of squared error of a row.
     """
 
     coefficients: FloatArray

@@ -95,7 +95,7 @@ class SlidingCurve:
     Attributes
     ----------
     friction, friction_std : float
-        Of the road on which it was calibrated: given (and certain), or fitted.
+        Friction of the road of the calibration: given (and certain), or fitted.
     grip : float
         Largest utilisation over the friction.
     sharpness, fading : float

@@ -26,7 +26,8 @@ class Extension(Step[Fitted]):
     Attributes
     ----------
     given, refitted, reached : ModelError
-        Of the model as it was given, with the numbers of the least error, and with the change.
+        Errors of the model as it was given, with the numbers of the least error, and with the
+        change.
     out_before, out_after : tuple of ModelError or None
         On what was held out, one per fold.
     runs : StraightRuns

@@ -80,7 +80,7 @@ def history_entry(
     errors : mapping
         By name; one that is not known is left out.
     unit : str
-        Of the errors: without noise they stand under names that end in it.
+        Unit of the errors: without noise they stand under names that end in it.
     names : sequence of str
         Numbers of the file that the step wrote.
     """

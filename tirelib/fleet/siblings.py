@@ -34,7 +34,7 @@ class Joined:
         Ratio of the standard deviation before to that after; its square is the factor of runs that
         the siblings are worth.
     mean, scatter : float
-        Of the population; the scatter is relative where the numbers are logarithms.
+        Mean and scatter of the population; the scatter is relative where numbers are logarithms.
     """
 
     value: FloatArray

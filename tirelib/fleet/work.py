@@ -124,7 +124,7 @@ def process(source: Source, mark: str, recipe: Recipe, address: str, verb: Verb)
         Its fingerprint.
     recipe : Recipe
     address : str
-        Of the data set.
+        Address of the data set.
     verb : callable
     """
     with _ONE_AT_A_TIME:

@@ -54,7 +54,7 @@ class Cells:
         The same for a curve that has the brush's slope at zero and its friction, but no bend at
         zero slip.
     slope : shape (m, p)
-        Of the prediction by z.
+        Slope of the prediction by z.
     weight : shape (m,)
         Sum of the points' weights.
     """

@@ -60,7 +60,7 @@ def estimates_of(study: Study, *, free_radius: float | None = None) -> tuple[Est
     ----------
     study : Study
     free_radius : float, [m], optional
-        Of the tire; a half length beyond 0.6 of it is no contact length.
+        Radius of the tire; a half length beyond 0.6 of it is no contact length.
     """
     names, fit = study.fit.names, study.fit
     errors = _errors(study, np.eye(len(names)), [property_terms(study, name) for name in names])

@@ -38,7 +38,7 @@ class BrushFit:
     Attributes
     ----------
     names : tuple of str
-        Of the fitted parameters, as in `tirelib.identify.brush_law.SPECS`.
+        Names of the fitted parameters, as in `tirelib.identify.brush_law.SPECS`.
     value, std : arrays, shape (p,)
         In the parameters' SI units; std is infinite where the data do not hold a parameter.
     covariance : array, shape (p, p)

@@ -80,8 +80,8 @@ class ForceMisfit:
     shape : Shape
         The likeliest.
     variance : float
-        Of the misfit at the reference load, over the force's scale squared; infinite where too few
-        points tell it.
+        Variance of the misfit at the reference load, over the force's scale squared; infinite where
+        too few points tell it.
     freedom : int
     evidence : float
         Logarithm of the restricted likelihood, over all shapes.
@@ -127,7 +127,7 @@ class Misfit:
         Parameters
         ----------
         gradient : shape (q, p)
-            Of the numbers by z.
+            Slopes of the numbers by z.
         terms : q sequences of Term
             What the misfit adds to them.
 

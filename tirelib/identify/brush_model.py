@@ -42,7 +42,7 @@ class BrushModel:
     Attributes
     ----------
     name : str
-        Of the file's tire.
+        Name of the file's tire.
     values : mapping of str to float
         Parameters by name of `tirelib.identify.brush_law.SPECS`, SI; those that the file does not
         state are absent and neutral (c_px as c_py).
@@ -135,7 +135,7 @@ def stored_number(
     Parameters
     ----------
     name : str
-        Of `SPECS`.
+        One of `SPECS`.
     value, std : float
         SI; a standard deviation that is not finite is left out.
     kind, source, notes : str, str, mapping

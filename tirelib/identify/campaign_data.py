@@ -112,7 +112,7 @@ class StraightRuns:
     Attributes
     ----------
     waves : Waveforms
-        Of these runs.
+        Waveforms of these runs.
     strain : shape (n_runs, n_phi), [-]
         Mean over the gages in use: the ring is as wide as the belt, and so is this mean.
     gages : tuple of int
@@ -214,7 +214,7 @@ def straight_noise(waves: Waveforms, strain: FloatArray) -> RepeatNoise:
     Parameters
     ----------
     waves : Waveforms
-        Of straight runs.
+        Waveforms of straight runs.
     strain : shape (n_runs, n_phi), [-]
         Mean over the gages in use.
     """

@@ -14,7 +14,7 @@ class Estimate:
     Attributes
     ----------
     name : str
-        Of a tire's number, or of a parameter of the brush's law.
+        Name of a tire's number, or of a parameter of the brush's law.
     value, std : float
         Structural misfit included.
     low, high : float

@@ -30,7 +30,7 @@ class ForceBench:
     points : ForcePoints
     conditions : BrushConditions
     law : Reference
-        Of the half length's law.
+        Law of the half length.
     half : shape (n,) or None
         Half contact length of the ring, if it gives it.
     ring_flatness : shape (n,) or float

@@ -33,7 +33,7 @@ class ForceData:
     block : array of int
         Points of one run, or of one stretch of a sweep: their errors may go together.
     speed, temperature, time : [m/s], [K], [s]
-        Of the road, of the tread, and since the campaign began; NaN where unknown.
+        Speed of the road, temperature of the tread, time since the campaign began; NaN if unknown.
     """
 
     load: FloatArray
@@ -96,7 +96,7 @@ def force_data(
     ----------
     campaigns : Campaign or sequence of Campaign
     every : int
-        Of a sweep's samples, each `every`-th is taken.
+        Each `every`-th sample of a sweep is taken.
     block : float, [s]
         Stretch of a sweep over which errors are taken to go together.
     travel_speed : bool

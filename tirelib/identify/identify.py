@@ -52,7 +52,7 @@ class Identification:
         With provenance; what the other verbs read.
     estimates : tuple of Estimate
     correlation : shape (n, n)
-        Of the estimates, by the fit.
+        Correlation of the estimates, by the fit.
     fit : WaveformFit
     runs : StraightRuns
     notes : tuple of str
@@ -87,7 +87,7 @@ def identify(
     base : str
         One of `BASES`.
     waves : Waveforms, optional
-        Of the campaign, when they have been read already.
+        Waveforms of the campaign, when they have been read already.
     progress : callable, optional
         Called with a label after each run and step.
     found : callable, optional

@@ -37,7 +37,7 @@ class Test:
     rows : shape (n_measured, n_free)
         Slopes of the measured logarithms by the free coordinates.
     covariance : shape (n_measured, n_measured)
-        Of the errors of measurement.
+        Covariance of the errors of measurement.
     by_definition : bool
         Whether it measures the numbers themselves rather than what the fitted ring does.
     """
@@ -58,7 +58,7 @@ def laboratory_tests(
     Parameters
     ----------
     values : mapping
-        Of the fitted tire.
+        Numbers of the fitted tire.
     free : tuple of Coordinate
     pressures : (float, float), [Pa]
         The lowest and the highest that can be set. Tests there are left out where the fitted

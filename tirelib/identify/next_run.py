@@ -49,7 +49,7 @@ class Remedy:
     ----------
     words : str
     half_width : float
-        Of the 95 % interval, in the coordinate (relative to the value for one that is scaled).
+        Half the 95 % interval, in the coordinate (relative to the value for one that is scaled).
     effort : int
         Runs, or quantities to be measured.
     """
@@ -66,7 +66,7 @@ class NextRun:
     Attributes
     ----------
     half_width : shape (n_free,)
-        Of the 95 % intervals now, in coordinates.
+        Half of each 95 % interval now, in coordinates.
     runs, tests : tuple of tuple of Remedy
         Per coordinate, the best first.
     """

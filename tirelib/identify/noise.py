@@ -29,7 +29,7 @@ class RepeatNoise:
     Attributes
     ----------
     std : float, [-]
-        Of a sample of a run's mean waveform; NaN without repeats.
+        Standard deviation of a sample of a run's mean waveform; NaN without repeats.
     repeats : int
         Set points that were measured more than once.
     power : shape (n_phi // 2 + 1,), [-]
@@ -37,7 +37,7 @@ class RepeatNoise:
     freedom : float
         Degrees of freedom of std: independent samples of all repeats.
     local_freedom : float
-        Of a smoothed order.
+        Degrees of freedom of a smoothed order.
     """
 
     std: float

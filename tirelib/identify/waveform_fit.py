@@ -83,7 +83,7 @@ class WaveformFit:
 
     @property
     def covariance(self) -> FloatArray:
-        """Of the free coordinates, (n_free, n_free)."""
+        """Covariance of the free coordinates, (n_free, n_free)."""
         return self.found.covariance[:-1, :-1]
 
     @property
@@ -137,7 +137,7 @@ def fit_waveforms(
     start : mapping
         Values of a tire, by name of `Tire`.
     prior : Prior
-        Of `free`, about `start`.
+        Prior of `free`, about `start`.
     free : tuple of Coordinate
     changes : sequence of (stage, change)
         Effects that the model has.

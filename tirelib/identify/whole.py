@@ -60,7 +60,7 @@ def identify_whole(
         Start and priors of the ring; where the campaign tells no ring, this one gives the contact
         length to the brush.
     base : str
-        Of the ring: the plain tire, or the dissertation's (`tirelib.identify.identify.BASES`).
+        Base of the ring: plain tire, or the dissertation's (`tirelib.identify.identify.BASES`).
     progress : callable, optional
         Called with a label at each step.
     found : callable, optional

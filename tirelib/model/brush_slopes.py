@@ -34,7 +34,7 @@ class StateSlopes:
     ----------
     state : BrushState
     turn : shape (n,), [rad]
-        Of the contact on its carcass: yaw compliance times moment.
+        Turn of the contact on its carcass: yaw compliance times moment.
     quantity : str
         Fx, Fy or Mz.
     """

@@ -23,7 +23,7 @@ class Suspect:
     Attributes
     ----------
     name : str
-        Of the effect, or `NOTHING`.
+        Name of the effect, or `NOTHING`.
     cost : float
         Chi-square left on the present runs, less that of no effect.
     strength : shape (components,)
@@ -48,7 +48,7 @@ class Trial:
         Those whose fits have settled.
     left_out : mapping of name to reason
     size : float
-        Of the structural misfit; 1 is that of plain tires.
+        Size of the structural misfit; 1 is that of plain tires.
     """
 
     rivals: tuple[Suspect, ...]

@@ -107,7 +107,7 @@ def plan_force_test(
     ----------
     case : ForceCase
     envelope : Envelope or None
-        Of `tirelib.planning.force_runs.force_envelope`; needed if there are suspects.
+        The one of `tirelib.planning.force_runs.force_envelope`; needed if there are suspects.
     catalogue : sequence of Effect
         What the suspects are held against.
     false_alarm : float
@@ -136,7 +136,7 @@ def next_test_document(
     told : mapping
         The diagnosis as JSON.
     hypotheses : Hypotheses
-        Of the diagnosis.
+        Hypotheses of the diagnosis.
     catalogue : mapping of name to Effect
     progress : callable, optional
 

@@ -29,7 +29,7 @@ class Axis:
     wider : float
         Share by which the ends of a campaign are moved outward where nothing is declared.
     levels : int
-        Of the grid; a range of one value has one.
+        Levels of the grid; a range of one value has one.
     series : str
         Key in JSON of the values that a sweep passes through; empty where there is no sweep of it.
     """
@@ -73,7 +73,7 @@ class Envelope:
     declared : tuple of str
         Which of them somebody gave; the others are the campaign's, widened.
     levels : mapping of axis to int
-        Of the grid, where they are not the usual ones (`AXES`).
+        Levels of the grid, where they are not the usual ones (`AXES`).
     sweep : Sweep, optional
         Slips that every run passes through (forces); they are then no axis of the grid.
     """

@@ -99,7 +99,7 @@ def next_test(
         About the present runs (a `StrainProblem` or a `ForceProblem`).
     suspects : Suspects
     envelope : Envelope
-        Of forces that of `tirelib.planning.force_runs.force_envelope`.
+        For forces the one of `tirelib.planning.force_runs.force_envelope`.
     model : ForceModel, optional
         The brush, of forces.
     progress : callable, optional

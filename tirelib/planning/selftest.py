@@ -33,7 +33,7 @@ class Planting:
     ----------
     effect : Effect
     ratio : float
-        Of the error with the effect over that without.
+        The error with the effect over that without.
     strength : float
         In the effect's unit.
     reachable : bool
@@ -124,7 +124,7 @@ def selftest(
     ----------
     runs : StraightRuns
     values : mapping
-        Of the model's tire.
+        Numbers of the model's tire.
     catalogue : sequence of Effect
         Everyone that a diagnosis looks at.
     effects, strengths

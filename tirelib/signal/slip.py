@@ -68,7 +68,7 @@ def unseen_by_traction(here: Rolled, before: Rolled, half: float) -> float:
     Parameters
     ----------
     here, before : Rolled
-        Of this contact and of the one before; where one is unknown, nothing is said.
+        This contact and the one before; where one is unknown, nothing is said.
     half : float, [rad]
         Half the angle of this contact.
     """

@@ -40,7 +40,7 @@ class Controls:
     Attributes
     ----------
     steer : array, [rad]
-        Of each wheel, to the left positive.
+        Angle of each wheel, to the left positive.
     drive : array, [N m]
         Torque on the wheel.
     brake : array, [N m]

@@ -27,11 +27,11 @@ class VehicleParameters:
     ----------
     sprung_mass : float, [kg]
     unsprung_mass : pair of float, [kg]
-        Of one wheel.
+        Mass of one wheel.
     inertia : tuple of 3 floats, [kg m^2]
-        Of the sprung mass in roll, pitch and yaw.
+        Inertia of the sprung mass in roll, pitch and yaw.
     spin_inertia : float, [kg m^2]
-        Of one wheel about its axle.
+        Inertia of one wheel about its axle.
     front, rear : float, [m]
         From the sprung mass's centre of gravity to the axles.
     track : pair of float, [m]

@@ -31,7 +31,7 @@ class Drive:
     vehicle : Vehicle
     state : array, shape (32,)
     longest : float, [s]
-        Of the integration; a longer communication step is divided evenly.
+        Longest step of the integration; a longer communication step is divided evenly.
     """
 
     def __init__(self, vehicle: Vehicle, state: FloatArray, longest: float = LONGEST) -> None:

@@ -49,14 +49,14 @@ class ForceCase:
     Attributes
     ----------
     name : str
-        Of the campaign.
+        Name of the campaign.
     model : ForceModel
     problem : MeasuredForce
         At the points that are fitted.
     whole : MeasuredForce
         At all points: those that errors are told of.
     noise : float, [N] or [N m]
-        Of a point; NaN without repeats.
+        Standard deviation of a point; NaN without repeats.
     repeats : int
     messages : tuple of str
     """

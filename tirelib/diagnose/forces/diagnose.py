@@ -82,11 +82,11 @@ def diagnose_force(
     ----------
     problem : MeasuredForce
     values : mapping
-        Of the model's brush.
+        Numbers of the model's brush.
     catalogue : sequence of Effect
         Those of stage brush are tried.
     noise : float, [N] or [N m]
-        Of a point, from repeats; NaN without.
+        Standard deviation of a point, from repeats; NaN without.
     effects, strengths
         That the model has already.
     false_alarm : float

@@ -93,7 +93,7 @@ class ForceFit:
     slopes : shape (p, n)
         By parameters (logarithms, or over their size) and by strengths over their range.
     covariance : shape (p, p)
-        Of these, with errors that go together within a block.
+        Covariance of these numbers, with errors that go together within a block.
     error : float
         Rms of measured less predicted, [N] or [N m].
     """

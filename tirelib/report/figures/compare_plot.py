@@ -76,7 +76,7 @@ def stacked(
     ----------
     x : shape (n,)
     values, differences : sequence of Trace
-        Of the upper and of the lower panel.
+        Traces of the upper and of the lower panel.
     mode : str
         lines or markers.
     """
