@@ -118,7 +118,7 @@ def diagnosed(
     false_alarm: float,
     progress: Callable[[str], None],
 ) -> tuple["Assessment | ForceAssessment", dict[str, Any]]:
-    """Return a diagnosis, and its document with the run that parts what cannot be told apart."""
+    """Return a diagnosis, and its document with the run that distinguishes what it cannot."""
     from tirelib.diagnose.document import Assessment, diagnosis_document
     from tirelib.diagnose.forces.document import force_diagnosis_document
     from tirelib.journey import diagnose as diagnose_model

@@ -93,7 +93,7 @@ DIAGNOSIS = "tirelib-diagnosis/1"
     "--suspects",
     "names",
     metavar="A,B",
-    help="Effects to tell apart; a single one is told apart from no effect at all.",
+    help="Effects to distinguish; a single one is distinguished from no effect at all.",
 )
 @range_options
 @click.option(

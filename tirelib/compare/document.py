@@ -80,7 +80,7 @@ def _strain(found: Comparison) -> dict[str, Any]:
 
 
 def edge_value(by: str, value: float) -> float:
-    """Return a condition in the unit that it is told in."""
+    """Return a condition in the unit that users see."""
     return float(QUANTITIES[by].told(value)) if by in QUANTITIES and np.isfinite(value) else value
 
 

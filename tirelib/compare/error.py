@@ -144,7 +144,7 @@ class Yardstick:
 
     @property
     def unit(self) -> str:
-        """In which errors are told."""
+        """Unit of errors."""
         return NOISE if np.isfinite(self.noise) else MICROSTRAIN
 
     def error(

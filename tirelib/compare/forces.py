@@ -132,7 +132,7 @@ class ForceComparison:
 
     @property
     def error_unit(self) -> str:
-        """In which the error is told: noise, N or Nm."""
+        """Unit of the error: noise, N or Nm."""
         return "noise" if np.isfinite(self.noise) else UNITS[self.quantity]
 
     @property

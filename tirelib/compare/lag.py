@@ -16,7 +16,7 @@ from tirelib.identify.random_effects import Whitening, angle_slope
 
 PASSES = 3
 SEEN = 3.0
-"""Standard deviations of a delay from which it is told."""
+"""Standard deviations of a delay from which it is reported."""
 
 
 def fitted_delay(
@@ -29,7 +29,7 @@ def fitted_delay(
     """Return the delay [s] and its standard deviation, by what of it goes with the speed.
 
     A zero of the wheel angle that is the same in all runs stands beside it, free: at one speed it
-    is all, and nothing is told of a delay.
+    is all, and no delay is reported.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ What was measured is known before any model: it has the same arrays without thos
 A trace is the difference (model less measured) that an effect would leave if the measured tire had
 it and the model did not: what it changes at its strength, less what the base model's numbers, the
 delay of the gages and the set points could take up, with the sign turned. It is of first order in
-these, so it shows the shape; how much an effect really takes away is told by an exact refit.
+these, so it shows the shape; how much an effect really takes away only an exact refit shows.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -206,7 +206,7 @@ def _guess(guess: Guess) -> dict[str, Any]:
             for term in guess.terms
         ],
         "note": "measured less model; a guess by sparse regression, kept on left-out conditions: "
-        "where and how it grows is often right, why is not told",
+        "where and how it grows is often right, the reason is not part of it",
     }
 
 

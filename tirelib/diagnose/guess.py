@@ -24,7 +24,7 @@ MOST_TERMS = 3
 LEAST_GAIN = 0.03
 """Share of the held-out squares that a further term has to take away."""
 WORTH = 0.3
-"""Share of the held-out squares from which a law is told at all."""
+"""Share of the held-out squares from which a law is reported at all."""
 REFERENCE = {"load": 4000.0, "pressure": 2.0e5, "speed": 20.0}
 POWERS = {"load": (-1.0, 1.0, 2.0), "pressure": (-1.0, 1.0), "speed": (1.0, 2.0)}
 STEEPEST = 6.0

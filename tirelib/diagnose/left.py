@@ -76,7 +76,7 @@ def left_of(error: ModelError, points: Operating, beyond: FloatArray | None = No
     points : Operating
     beyond : shape (n_runs, n_phi), optional
         The part of the whitened residual that structure does not explain: place and scaling are
-        told of it; of the whole residual if it is not given.
+        those of it; of the whole residual if it is not given.
     """
     white = -error.white_of(error.rest)
     told, edges = white if beyond is None else beyond, error.prediction.edges
@@ -163,7 +163,7 @@ def powers_of(conditions: Mapping[str, FloatArray], size: FloatArray) -> dict[st
 
 
 def _varies(values: FloatArray) -> bool:
-    """Whether a condition has levels of one sign that a power can be told of."""
+    """Whether a condition has levels of one sign from which a power can be estimated."""
     if not np.isfinite(values).all() or (np.abs(values) < 1e-3).any():
         return False
     return bool(levels(np.abs(values)).max() > 0)

@@ -24,7 +24,7 @@ FEWEST_LOADS = 3
 LEAST_SHARE = 0.01
 """Floor of the relative standard deviation with which the fits of a load are weighed."""
 SHAPE = 1.3
-"""Shape factor C, held: it cannot be told from E without data beyond the peak."""
+"""Shape factor C, held: it cannot be distinguished from E without data beyond the peak."""
 
 
 @dataclass(frozen=True, slots=True)

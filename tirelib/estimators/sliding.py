@@ -20,8 +20,8 @@ driven is pulled against its slip: where :math:`s_x` is known, the direction of 
 the slip. For given :math:`u_y`, a friction and a lateral slip that are evenly spread over their
 ranges give t the density :math:`\propto (\sigma / s_y) [1 - (1 - t)^n]^{-2}`; beyond t = 1 the
 tread slides as a whole, and the slip is any larger one. This density, times the likelihood of the
-readings, has the mean and the standard deviation that are told. Where they say nothing, the angle
-stays that of the calibrated road, and how far the mean lies from it is doubt.
+readings, has the mean and the standard deviation that are reported. Where they say nothing, the
+angle stays that of the calibrated road, and how far the mean lies from it is doubt.
 """
 
 from dataclasses import dataclass, fields

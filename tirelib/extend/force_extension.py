@@ -25,7 +25,7 @@ class ForceExtension(Step[ForceFit]):
     ----------
     case : ForceCase
     given : float
-        Error of the model before the step as it was given, in the unit in which errors are told.
+        Error of the model before the step as it was given, in the unit of errors.
     """
 
     case: ForceCase

@@ -3,8 +3,8 @@
 The brush is not the tire: its misfit over slip and load is a smooth function, which more points do
 not average out. Per force it is taken as a Gaussian process, odd in the force's own slip up to a
 small even part, growing with load, with the scatter from point to point beside it. Size and lengths
-are told by the residuals (restricted likelihood: the part that the parameters took up is allowed
-for), over a small grid.
+are estimated from the residuals (restricted likelihood: the part that the parameters took up is
+allowed for), over a small grid.
 
 A tire's own property (cornering stiffness at zero slip, largest force) is the best brush's plus
 what the misfit adds there; mean and variance of both together follow by universal kriging.

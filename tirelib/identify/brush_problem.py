@@ -137,7 +137,7 @@ class BrushProblem:
         return np.asarray(scale, dtype=np.float64)
 
     def covariance(self, z: FloatArray, robust: float | None) -> FloatArray:
-        """Return the covariance of z, by blocks; infinite variance where nothing is told."""
+        """Return the covariance of z, by blocks; infinite variance where nothing is known."""
         r, J = self.residual(z).ravel(), self.jacobian(z)
         weight = np.ones_like(r) if robust is None else robust / np.maximum(np.abs(r), robust)
         J, r = J * np.sqrt(weight)[:, None], r * np.sqrt(weight)

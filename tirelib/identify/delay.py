@@ -15,7 +15,7 @@ from tirelib.model.chain import Change
 STD = 6e-5
 """Standard deviation of the delay, [s]: uniform to a sample at 10 kHz."""
 UNIT = 1e-4
-"""Delay in which slopes and coordinates are told, [s]."""
+"""Unit of the delay in slopes and coordinates, [s]."""
 
 
 def late(delay: float) -> tuple[str, Change]:

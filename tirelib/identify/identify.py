@@ -30,7 +30,7 @@ from tirelib.waveforms import Waveforms, measure_waveforms
 WIDEST = 0.25
 """Relative half-width of a 95 % interval up to which a number is called identifiable."""
 TOLD = 0.6
-"""Share of the prior's deviation below which the campaign has told something."""
+"""Share of the prior's deviation below which the campaign has added knowledge."""
 
 BASES = ("plain", "dissertation")
 """The plain tire, and the ring whose belt does not shear on a road without friction."""

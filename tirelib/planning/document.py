@@ -23,7 +23,7 @@ FORMAT = "tirelib-next-test/1"
 PROMISING = 0.5
 """Chance of ruling a suspect out below which a run is not advised without a warning, and from which
 a plan that is measured again shows an effect."""
-NONE = "nothing is in doubt: this campaign leaves no effects that have to be told apart"
+NONE = "nothing is in doubt: this campaign leaves no effects that have to be distinguished"
 STRUCTURE = "what plain tires show in addition to the model"
 """What hides effects and does not average out."""
 

@@ -23,7 +23,7 @@ class Axis:
     Attributes
     ----------
     quantity : Quantity
-        How it is told.
+        Its name, unit and conversion.
     key : str
         In JSON.
     wider : float

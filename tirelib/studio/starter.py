@@ -75,7 +75,7 @@ class Starter:
         return codes
 
     def end(self, number: int) -> None:
-        """End a job and its children, and wait until they are gone; its exit code is not told."""
+        """End a job and its children, and wait until they are gone; its exit code is not sent."""
         self._hear()
         begun, until = self.running.get(number), time.monotonic() + LONGEST_END
         self._order({"end": number})

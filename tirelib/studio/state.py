@@ -1,4 +1,4 @@
-"""What the page is told of a session: lists for all views, without the documents themselves."""
+"""What the page knows of a session: lists for all views, without the documents themselves."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path

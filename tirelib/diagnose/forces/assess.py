@@ -35,7 +35,7 @@ LEAST_POINTS = 12
 NO_FIT = 0.5
 """Share of the measured rms that a fitted brush may leave before it does not fit at all."""
 IN_ORDER = 0.8
-"""Correlation with the order of measurement from which a condition cannot be told from drift."""
+"""Correlation with the order of measurement from which a condition cannot be split from drift."""
 NO_REPEATS = (
     "no condition was repeated, so the noise is unknown: errors are in {unit}, no effect is named "
     "and none is more than a hint; repeat some runs, or pass a sweep's conditions twice"
@@ -54,7 +54,7 @@ class ForceCase:
     problem : MeasuredForce
         At the points that are fitted.
     whole : MeasuredForce
-        At all points: those that errors are told of.
+        At all points, for which errors are reported.
     noise : float, [N] or [N m]
         Standard deviation of a point; NaN without repeats.
     repeats : int
@@ -76,7 +76,7 @@ class ForceCase:
 
     @property
     def unit(self) -> str:
-        """In which errors are told: noise, N or Nm."""
+        """Unit of errors: noise, N or Nm."""
         return "noise" if np.isfinite(self.noise) else UNITS[self.quantity]
 
     @property
@@ -316,7 +316,7 @@ def _in_order(case: ForceCase, effects: Sequence[Effect]) -> list[str]:
         if abs(together) > IN_ORDER:
             out.append(
                 f"{name} went with the order of measurement (correlation {together:.2f}): an "
-                f"effect of {name} and a drift can hardly be told apart; repeat the first {name} "
-                "at the end to know"
+                f"effect of {name} and a drift can hardly be distinguished; repeat the first "
+                f"{name} at the end to know"
             )
     return out
