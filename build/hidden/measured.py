@@ -15,7 +15,7 @@ import numpy as np
 
 from hidden.plan import Day, day
 from tirelib.arrays import FloatArray
-from tirelib.campaign import CampaignHeader, TireGeometry, Tolerance
+from tirelib.rig.campaign import rig_header
 from tirelib.rig.hidden import HIDDEN
 from tirelib.rig.measure import gages
 from tirelib.rig.mesh import mesh
@@ -159,7 +159,12 @@ def blank(today: Day) -> Waveforms:
     """Return the campaign of a day without its numbers."""
     chain, n = today.chain, len(today.nominal)
     return Waveforms(
-        header=_header(today),
+        header=rig_header(
+            f"hidden-{today.seed}",
+            today.tire,
+            today.chain,
+            "mean waveforms, made without files",
+        ),
         strain=np.zeros((n, N_STRIPS, N_PHI)),
         run=np.arange(n),
         turns=np.full(n, TURNS),
@@ -210,30 +215,3 @@ def _conditions(
         found[name] = read([0.0] * n, chain.angle_noise)
     found["slip_ratio"] = read([0.0] * n, chain.slip_noise)
     return found
-
-
-def _header(today: Day) -> CampaignHeader:
-    tire, chain = today.tire, today.chain
-    return CampaignHeader(
-        name=f"hidden-{today.seed}",
-        axes="iso",
-        tire=TireGeometry(
-            name=tire.name,
-            free_radius=tire.free_radius,
-            ring_radius=tire.ring_radius,
-            tread_thickness=tire.tread_thickness,
-            belt_width=tire.belt_width,
-            innerliner_offset=tire.innerliner_offset,
-        ),
-        gage_lateral=tuple(float(y) for y in tire.lateral),
-        rate=chain.gage_rate,
-        strain_unit="ustrain",
-        tolerance=Tolerance(
-            load=chain.load_setting,
-            pressure=chain.pressure_setting,
-            speed=chain.speed_setting,
-            gain=chain.gain_repeatability,
-        ),
-        rig_name="tirelib numerical flat-belt rig",
-        rig_note="mean waveforms, made without files",
-    )

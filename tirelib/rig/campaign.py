@@ -222,9 +222,9 @@ def run_plan(
                 progress(count, len(tasks))
             yield _run(job, recording)
 
-    write_campaign(
-        folder, _header(plan, tire, chain, axes), finished(), axes=axes, overwrite=overwrite
-    )
+    note = f"{plan.about}; five turns of a steady run; the truth is in {TRUTH_FILE}"
+    header = rig_header(f"rig-{plan.name}", tire, chain, note, axes)
+    write_campaign(folder, header, finished(), axes=axes, overwrite=overwrite)
     write_truth(folder / TRUTH_FILE, truths)
     return truths
 
@@ -281,9 +281,12 @@ def _run(job: Job, recording: Recording) -> Run:
     )
 
 
-def _header(plan: Plan, tire: RigTire, chain: MeasuringChain, axes: str) -> CampaignHeader:
+def rig_header(
+    name: str, tire: RigTire, chain: MeasuringChain, note: str, axes: str = "iso"
+) -> CampaignHeader:
+    """Return the header of a campaign on the rig: its tire, its gages, what its settings hold."""
     return CampaignHeader(
-        name=f"rig-{plan.name}",
+        name=name,
         axes=axes,
         tire=TireGeometry(
             name=tire.name,
@@ -303,7 +306,7 @@ def _header(plan: Plan, tire: RigTire, chain: MeasuringChain, axes: str) -> Camp
             gain=chain.gain_repeatability,
         ),
         rig_name="tirelib numerical flat-belt rig",
-        rig_note=f"{plan.about}; five turns of a steady run; the truth is in {TRUTH_FILE}",
+        rig_note=note,
     )
 
 
