@@ -39,7 +39,7 @@ COMMANDS: Mapping[str, str] = {
     "fall_back": "build/fall_back.py",
 }
 """What each measures stands at the top of its file, what it found in docs/howto/cosim.md,
-docs/theory/vehicle.md, docs/reference/bench_proof.md and docs/theory/estimates_measured.md."""
+docs/theory/closed_loops.md, docs/reference/bench_proof.md and docs/theory/estimates_measured.md."""
 
 
 def measured(name: str, folder: Path) -> bool:

@@ -1,7 +1,7 @@
 """Coverage of the brush's intervals on random tires of the Magic Formula, whose truth is exact.
 
-    python build/proof/brush.py                    the table of docs/howto/identify.md
-    python build/proof/brush.py --seeds 200-209    fewer tires
+    python build/proof/brush.py                  the table of docs/theory/identification_measured.md
+    python build/proof/brush.py --seeds 200-209  fewer tires
 
 Another structure than the brush's: its friction and slopes at zero slip are those of the formula.
 """
