@@ -3,6 +3,7 @@
 import socket
 import threading
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import pytest
 
@@ -10,7 +11,10 @@ from tests.bench.programs import PATIENCE
 from tests.bench.servers import Server
 from tirebench.deadline import Deadline
 from tirebench.errors import DeviceError, LinkError, UnpluggedError
+from tirebench.links import socket_port
 from tirebench.links.opening import PortPlan
+from tirebench.links.serial_port import GATHER
+from tirebench.links.slcan_port import commands
 from tirebench.links.socket_port import SocketLink
 
 
@@ -50,6 +54,68 @@ def test_datagrams_are_read_as_they_come(udp: SocketLink) -> None:
         for part in (b"one", b"two", b"three"):
             sender.sendto(part, udp._socket.getsockname())
     assert received(udp, 11) == b"onetwothree"
+
+
+def test_an_empty_datagram_ends_nothing(udp: SocketLink) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for part in (b"", b"more"):
+            sender.sendto(part, udp._socket.getsockname())
+    assert received(udp, 4) == b"more"
+
+
+def test_what_a_server_sent_before_it_hung_up_is_not_lost() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        link = SocketLink(f"tcp://127.0.0.1:{listening.getsockname()[1]}")
+        line, _ = listening.accept()
+        line.sendall(b"last words")
+        line.close()
+    assert received(link, 10) == b"last words"
+    with pytest.raises(UnpluggedError):
+        received(link, 1)
+    link.close()
+
+
+def test_reads_are_as_far_apart_as_bytes_are_gathered(
+    udp: SocketLink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waits: list[float] = []
+    clock = SimpleNamespace(sleep=waits.append, monotonic=lambda: 5.0, monotonic_ns=int)
+    monkeypatch.setattr(socket_port, "time", clock)  # no time goes by
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.sendto(b"one", udp._socket.getsockname())
+        assert received(udp, 3) == b"one"
+        sender.sendto(b"two", udp._socket.getsockname())
+        assert received(udp, 3) == b"two"
+    assert waits[0] == 0.0
+    assert 0.0 < waits[-1] <= GATHER
+
+
+def test_an_adapter_behind_a_server_is_opened_with_both_bit_rates() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        number = listening.getsockname()[1]
+        plan = PortPlan(f"slcan:tcp://127.0.0.1:{number}", bitrate=250_000, data_bitrate=2_000_000)
+        link = plan.open()
+        line, _ = listening.accept()
+        wanted = commands(250_000, 2_000_000, transmit=False)
+        with line:
+            assert line.recv(len(wanted), socket.MSG_WAITALL) == wanted
+        link.close()
+
+
+def test_an_adapter_that_takes_no_command_leaves_no_open_port(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    closed: list[SocketLink] = []
+
+    def refuse(link: SocketLink, _: bytes) -> None:
+        raise UnpluggedError(link.name)
+
+    monkeypatch.setattr(SocketLink, "send", refuse)
+    monkeypatch.setattr(SocketLink, "close", lambda link: closed.append(link))
+    with socket.create_server(("127.0.0.1", 0)) as listening, pytest.raises(UnpluggedError):
+        PortPlan(f"slcan:tcp://127.0.0.1:{listening.getsockname()[1]}").open()
+    (link,) = closed
+    link._socket.close()
 
 
 def test_an_address_in_use_or_nobody_there_is_told(udp: SocketLink) -> None:

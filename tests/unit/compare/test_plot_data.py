@@ -41,6 +41,7 @@ def test_the_trace_of_the_planted_effect_looks_like_what_is_left(tmp_path: Path)
     planted = [(EFFECT, (STRENGTH,)), ("gage_length", (900.0,))]
     data = plot_data(found, cast(Campaign, None), file, planted, CATALOGUE)
     np.testing.assert_allclose(data["difference"], 1e6 * found.difference)
+    assert data["noise"] == pytest.approx(1e6 * found.noise.std)
     white, whiten = data["white"], found.error.whiten
     assert np.sqrt(np.mean(white**2)) == pytest.approx(found.error.value)
     at, low_pass = operating_points(found.chosen.waves), found.chosen.waves.low_pass
@@ -54,6 +55,10 @@ def test_the_trace_of_the_planted_effect_looks_like_what_is_left(tmp_path: Path)
     assert like(whiten(1e-6 * own).ravel(), rest) > 0.95
     other = whiten(1e-6 * data["trace_gage_length"]).ravel()
     assert abs(like(other, rest)) < 0.8
+    # what a run's errors of load, pressure, gain and angle would take is out of it
+    shifts = found.points.tangent[..., :4]
+    size = np.sqrt(np.sum(own**2, axis=1)[:, None] * np.sum(shifts**2, axis=1))
+    assert np.all(np.abs(np.sum(own[..., None] * shifts, axis=1)) < 0.02 * size)
     write_plot_data(tmp_path / "d.npz", data)
     with np.load(tmp_path / "d.npz") as again:
         assert str(again["quantity"]) == "strain"
@@ -70,6 +75,8 @@ def test_the_trace_of_a_brush_effect_looks_like_what_is_left(tmp_path: Path) -> 
     found_like = like(data["trace_friction_load"], data["difference"])
     assert found_like > 0.5  # of first order: the fit has moved stiffness and friction far
     assert abs(like(data["trace_conicity"], data["difference"])) < 0.5 * found_like
+    for name, _ in planted:  # a constant force and a harder brush are out of it
+        assert abs(like(data[f"trace_{name}"], np.ones(len(data["run"])))) < 1e-6
 
 
 def test_what_was_measured_is_the_same_before_and_after_a_model(tmp_path: Path) -> None:
@@ -123,6 +130,34 @@ def test_an_effect_below_zero_that_cannot_be_there_is_refused_in_plain_words() -
         "plausible); there is nothing to draw"
     )
     assert "trace_belt_shear" in data
+
+
+def test_a_law_that_fails_within_its_range_says_why_itself() -> None:
+    def broken(*_: Any) -> Any:
+        raise ParameterError("no such belt")
+
+    file, name = model_file(), "sidewall_load"
+    found = compare_strain(waves(EFFECT, STRENGTH), model_of(file))
+    effects = {name: replace(CATALOGUE[name], law=broken, low=-1.0)}
+    for strength in (-2.0, 0.1):
+        data = plot_data(found, cast(Campaign, None), file, [(name, (strength,))], effects)
+        assert str(data[f"fault_{name}"]) == "no such belt"
+
+
+def test_both_ways_of_rolling_are_one_speed() -> None:
+    file = model_file()
+    found = compare_strain(waves(EFFECT, STRENGTH), model_of(file))
+    there = found.chosen.waves
+    way = np.where(np.arange(len(there)) % 2 == 0, 1.0, -1.0)
+    conditions = {**there.conditions, "speed": way * there.conditions["speed"]}
+    turned = replace(
+        found, chosen=replace(found.chosen, waves=replace(there, conditions=conditions))
+    )
+    levels = [
+        plot_data(one, cast(Campaign, None), file, [], CATALOGUE)["level_speed"]
+        for one in (found, turned)
+    ]
+    np.testing.assert_array_equal(*levels)
 
 
 def test_the_scatter_of_a_rig_makes_no_set_points_of_its_own(tmp_path: Path) -> None:

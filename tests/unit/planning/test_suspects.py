@@ -59,6 +59,22 @@ def test_a_named_effect_stands_beside_its_living_twins_and_the_others_stay() -> 
     assert [effect.name for effect, _ in found.beside] == ["camber"]
 
 
+def test_what_every_explanation_holds_stands_beside_what_they_differ_in() -> None:
+    names = ["camber", "low_pass", "angle_zero"]
+    diagnosis = told("indistinguishable", names, *(entry(name, "alarm") for name in names))
+    diagnosis["sets"] = [["camber", "low_pass"], ["camber", "angle_zero"]]
+    found = suspects_of(diagnosis, CATALOGUE)
+    assert found.names == ("low_pass", "angle_zero")
+    assert [effect.name for effect, _ in found.beside] == ["camber"]
+
+
+def test_a_given_effect_begins_on_the_wider_side_and_a_single_one_against_nothing() -> None:
+    alone = given_suspects(["centrifugal"], [], CATALOGUE)
+    assert alone.with_nothing
+    assert alone.effects[0][1] == pytest.approx([0.1 * CATALOGUE["centrifugal"].low])
+    assert not given_suspects(["centrifugal", "low_pass"], [], CATALOGUE).with_nothing
+
+
 def test_hints_stand_against_nothing() -> None:
     found = suspects_of(
         told("none", [], entry("low_pass", "hint"), entry("camber", "quiet")), CATALOGUE

@@ -10,7 +10,7 @@ from tests.unit.planning.drifting import PRESSURES, case
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.effects import CATALOGUE
 from tirelib.errors import ParameterError
-from tirelib.identify.force_points import force_points
+from tirelib.identify.force_points import ForcePoints, force_points
 from tirelib.planning.document import Plan, plan_document, plan_force_test
 from tirelib.planning.envelope import Envelope
 from tirelib.planning.force_runs import bench_ahead, force_envelope
@@ -48,6 +48,40 @@ def test_the_campaign_s_kind_of_run_is_told_from_the_order_of_its_points() -> No
     assert campaign_sweep(scattered().problem.bench.points, "slip_angle") is None
     assert force_envelope(scattered(), **DECLARED).sweep is None
     assert force_envelope(scattered(), **DECLARED).points == 1
+
+
+def in_runs(slips: list[int], camber: float = 0.0) -> ForcePoints:
+    """Return points in runs of so many slips, at two loads or, if it is given, two cambers."""
+    data, n = case("pressure", 0.03).problem.bench.points.data, sum(slips)
+    number = np.repeat(np.arange(len(slips)), slips)
+    here = data.take(np.zeros(n, dtype=np.int64))
+    level = np.zeros(n) if camber else 2e3 * (number % 2)
+    return force_points(
+        replace(
+            here,
+            slip_angle=np.concatenate([np.linspace(-0.1, 0.1, count + 1)[1:] for count in slips]),
+            load=2e3 + level,
+            camber=camber * (number % 2),
+            time=np.arange(float(n)),
+            block=np.arange(n),
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    ("slips", "camber", "several"),
+    [
+        ([4] * 6, 0.0, True),
+        ([3] * 6, 0.0, False),  # three slips are no sweep
+        ([6] * 5 + [1] * 20, 0.0, True),  # more than half of the points are in runs of many
+        ([6] * 5 + [1] * 40, 0.0, False),
+        ([2] * 12, 0.05, False),  # another camber begins another run
+    ],
+)
+def test_most_points_are_in_runs_of_four_slips_or_each_is_a_run(
+    slips: list[int], camber: float, several: bool
+) -> None:
+    assert (campaign_sweep(in_runs(slips, camber), "slip_angle") is not None) == several
 
 
 def test_either_kind_may_be_asked_for() -> None:
