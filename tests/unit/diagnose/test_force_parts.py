@@ -1,6 +1,7 @@
 """Parts of a diagnosis of forces: folds, what is left, and laws of a verdict."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from tests.unit.force_points import ANGLES, LOADS, MODEL, PRESSURES, VALUES
 from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
 from tirelib.diagnose.forces.diagnose import diagnose_force
 from tirelib.diagnose.forces.fit import MeasuredForce, fit_force
-from tirelib.diagnose.forces.held_out import force_folds
+from tirelib.diagnose.forces.held_out import errors_of, force_folds
 from tirelib.diagnose.forces.left import left_of
 from tirelib.diagnose.held_out import Fold, pooled
 from tirelib.effects import CATALOGUE, effect
@@ -62,6 +63,44 @@ def test_cells_are_held_out_where_no_set_point_can_be_spared() -> None:
     cell = made.bench.points.cell
     for k in np.unique(cell):
         assert len({tuple(column) for column in out[:, cell == k].T}) == 1
+
+
+def test_what_is_held_out_does_not_move_the_fit_that_predicts_it() -> None:
+    made = problem()
+    fit = fit_force(made, VALUES | {"friction": 0.95})
+    (fold,) = force_folds(made)
+    far = replace(made, measured=made.measured + 1e4 * fold.out)
+    (near,), (error,) = errors_of(made, fit, [fold]), errors_of(far, fit, [fold])
+    # without a change of the fit 1e4 N are missed as a whole, beside a few
+    assert error == pytest.approx(1e4, abs=2.0 * near)
+
+
+def test_a_dozen_points_must_be_left_to_fit() -> None:
+    made = problem()
+    load = made.bench.points.data.load
+    high, low = np.flatnonzero(load == 6e3), np.flatnonzero(load < 6e3)
+    for left, wanted in ((12, "load"), (11, "cell")):
+        spread = low[np.linspace(0, low.size - 1, left).astype(int)]  # some of each load
+        folds = force_folds(made.take(np.concatenate([high, spread])))
+        assert folds[0].name == wanted
+
+
+def test_blocks_of_eleven_seconds_take_turns_and_the_hottest_fifth_is_held_out() -> None:
+    made = problem()
+    n = len(made)
+    time = 0.5 * np.arange(n)
+    points = made.bench.points
+    warm = replace(points.data, time=time, temperature=293.0 + 0.2 * np.arange(n))
+    swept = replace(points, data=warm, sweep=np.ones(n, dtype=bool))
+    bench = MODEL.bench(swept)
+    folds = force_folds(replace(made, bench=bench))
+    parts = [fold for fold in folds if fold.name == "time"]
+    for fold in parts:
+        assert len({tuple(fold.out[k : k + 22]) for k in range(0, n - 21, 22)}) == 2
+        assert set(np.diff(np.flatnonzero(np.diff(fold.out)))) <= {22, 66}
+    (hot,) = (fold for fold in folds if fold.name == "temperature")
+    assert hot.out.sum() == pytest.approx(0.2 * n, abs=1)
+    assert hot.out[-1]
 
 
 def test_the_held_out_error_is_over_the_points_of_the_folds_that_count() -> None:

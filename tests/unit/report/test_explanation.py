@@ -272,6 +272,7 @@ def test_effects_that_the_plan_would_mostly_miss_need_other_runs() -> None:
 
 def test_without_a_name_one_error_is_told() -> None:
     told = explained(diagnosis(verdict="none", named=[], error_after=23.5, floor=23.5))
+    assert "In 41 % of plain tires" in told.sure
     assert told.error == (
         "It is 30 times the noise (84.3 microstrain rms, errors of the set points included), 23.5 "
         "with the model's own numbers fitted anew. All that is left is noise and the structure of "
