@@ -59,7 +59,7 @@ def in_runs(slips: list[int], camber: float = 0.0) -> ForcePoints:
     return force_points(
         replace(
             here,
-            slip_angle=np.concatenate([np.linspace(-0.1, 0.1, count + 1)[1:] for count in slips]),
+            slip_angle=np.deg2rad(np.arange(n) % 24 - 12.0),
             load=2e3 + level,
             camber=camber * (number % 2),
             time=np.arange(float(n)),
