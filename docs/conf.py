@@ -63,7 +63,7 @@ def setup(app):
 def write_generated(folder):
     """Write the tables and the equations, and draw their plots."""
     tables.write_all(folder)
-    for name in equations.plots():
+    for name in [*equations.plots(), "plain_tires"]:
         plots.draw(name, folder / "plots")
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from tirelib import infer
 from tirelib.brush.parabola import (
     aligning_moment,
     bristle_stiffness,
@@ -23,6 +24,8 @@ from tirelib.contact import radial, shear
 from tirelib.contact.profiles import convex_concave, power_law
 from tirelib.contact.static import StaticContact, StaticTire, press_to_deflection
 from tirelib.contact.tread import Tread
+from tirelib.effects import CATALOGUE
+from tirelib.infer.plain import load
 from tirelib.parameters import read_tire
 from tirelib.report.style import label, legend_below, new_figure, sequence, styled
 from tirelib.ring.compliance import compliance
@@ -259,6 +262,21 @@ def sheared_tread(axes: Panels) -> None:
     axes[0].set(xlabel=label("wheel angle", "deg"), ylabel=label("per length", "kN/m"))
 
 
+def plain_tires(axes: Panels) -> None:
+    """Draw what plain tires show of each effect: mean and standard deviation over a family."""
+    families, _ = load(Path(infer.__file__).parent / "plain_tires.npz")
+    names = [name for name in families[0].means if name in CATALOGUE]
+    for k, family in enumerate(families):
+        mean = [family.means[name] for name in names]
+        width = np.sqrt([family.shown()[name] for name in names])
+        axes[0].errorbar(mean, np.arange(len(names)) + 0.2 * (k - 1), xerr=width, fmt="o", ms=3)
+        axes[0].lines[-1].set_label(family.name)
+    axes[0].set_yticks(range(len(names)), names)
+    axes[0].set(xlabel="apparent strength, in whole ranges", xticks=[-0.05, 0.0, 0.05])
+    axes[0].invert_yaxis()
+    axes[0].legend()
+
+
 PLOTS: dict[str, tuple[int, Callable[[Panels], None]]] = {
     "strain_parts": (1, strain_parts),
     "carcass": (1, carcass),
@@ -273,8 +291,10 @@ PLOTS: dict[str, tuple[int, Callable[[Panels], None]]] = {
     "frequencies": (2, frequencies),
     "rolling_pressure": (1, rolling_pressure),
     "sheared_tread": (1, sheared_tread),
+    "plain_tires": (1, plain_tires),
 }
-"""Panels of each plot, and what draws them; `plot` in `theory/equations.toml` names one."""
+"""Panels of each plot, and what draws them; `plot` in `theory/equations.toml` names one, and
+`theory/inference.md` the last."""
 
 
 @styled

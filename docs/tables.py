@@ -153,6 +153,9 @@ TABLES = {
     "virtual_variables": virtual_variables,
     "documents": documents,
     "equations": equations,
+    "plain_tires": lambda: (
+        "![Apparent strengths of plain tires](/_generated/plots/plain_tires.png)"
+    ),
 }
 """Generated parts of pages, by the name of their file."""
 

@@ -18,8 +18,11 @@ falls with the load, which the base model does not have.
 # coefficient falls with load by a power of 0.25, with a noise of 6 N. Measurements of your own come
 # in by :doc:`own_measurements`.
 
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
+from textwrap import fill
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -116,8 +119,20 @@ fig.tight_layout()
 #    tirelib diagnose cornering --model M.toml --quantity Fy --out what-is-missing
 #    tirelib add friction_load --model M.toml --data cornering --out M2.toml
 #
-# or all of it at once: ``tirelib explain cornering --quantity Fy --out explained``.
-#
+# or all of it at once, which the script does here:
+
+explain = "tirelib explain cornering --quantity Fy --out explained"
+done = subprocess.run(
+    [sys.executable, "-m", *explain.split()],
+    cwd=folder,
+    capture_output=True,
+    text=True,
+    check=True,
+)
+for line in [f"$ {explain}", *done.stdout.splitlines()[:8]]:
+    print(fill(line, 88, subsequent_indent="    "))
+
+# %%
 # In the studio
 # -------------
 #
@@ -127,7 +142,11 @@ fig.tight_layout()
 #
 # opens a page in the browser. *See* shows the residual over slip and load; *Find what is missing*
 # runs the diagnosis; tick ``friction_load`` and *Add*. The five steps with pictures are in
-# :doc:`/howto/studio`. What the page shows are the documents of the commands above.
+# :doc:`/howto/studio`; here the third one, on a campaign of strain. What the page shows are the
+# documents of the commands above.
+#
+# .. image:: /howto/studio/suspect.png
+#    :alt: The studio: effects, verdict, and what the suspected effect would leave
 #
 # On strain
 # ---------
@@ -143,4 +162,4 @@ fig.tight_layout()
 #    tirelib add sidewall_damping --model M.toml --data straight --out M2.toml
 #
 # How a verdict is reached is on :doc:`/howto/diagnose`, with equations on :doc:`/theory/inference`,
-# and how often it is right on :doc:`/theory/limits`.
+# and how often it is right on :doc:`/theory/verdicts_measured`.
