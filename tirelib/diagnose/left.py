@@ -115,7 +115,7 @@ def told_powers(powers: Mapping[str, Power | None]) -> str:
         for name, power in powers.items()
         if power is not None and abs(power.value) >= FLAT and power.low * power.high > 0.0
     ]
-    return " and ".join(moves) or "is alike in all runs"
+    return " and ".join(moves) or "is the same in all runs"
 
 
 def _span(squares: FloatArray) -> tuple[float, float]:

@@ -112,7 +112,8 @@ def unpack(archive: Path, target: Path) -> None:
     Raises
     ------
     FormatError
-        If it is none, holds too much, grows too much, or has links or names that lead outside.
+        If it is no zip archive, holds too much, grows too much, or has links or names that lead
+        outside.
     """
     try:
         with zipfile.ZipFile(archive) as opened:

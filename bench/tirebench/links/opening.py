@@ -138,7 +138,7 @@ def bus_options(texts: Sequence[str]) -> dict[str, Any]:
     Raises
     ------
     DeviceError
-        With every text that is none.
+        With every text that has no ``=``.
 
     Examples
     --------

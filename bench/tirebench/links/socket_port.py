@@ -31,7 +31,7 @@ class SocketLink:
     Raises
     ------
     DeviceError
-        If the address is none.
+        If it is not a valid address.
     LinkError
         If the server is not there, or the address is in use.
     """
@@ -138,7 +138,7 @@ def address(url: str) -> tuple[str, str, int]:
     Raises
     ------
     DeviceError
-        If the address is none.
+        If it is not a valid address.
 
     Examples
     --------

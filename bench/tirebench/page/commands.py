@@ -61,7 +61,7 @@ def parse_command(document: Any) -> Command:
     Raises
     ------
     DeviceError
-        If it is none.
+        If it is no command.
     """
     given = document.get("command") if isinstance(document, dict) else type(document).__name__
     if given not in KINDS:

@@ -86,7 +86,7 @@ class ProtocolPlan:
         Raises
         ------
         RecordingError
-            If it names an encoding that is not known here, or a rate that is none.
+            If it names an encoding that is not known here, or an impossible rate.
         """
         encoding = header.get("encoding", SERIAL)
         if encoding not in ENCODINGS:

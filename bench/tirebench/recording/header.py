@@ -133,7 +133,7 @@ def json_of(text: str | bytes) -> Any:
     Raises
     ------
     ValueError
-        If it is none, or nested too deeply to be read.
+        If it is no JSON, or nested too deeply to be read.
     """
     try:
         return json.loads(text)

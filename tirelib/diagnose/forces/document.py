@@ -81,7 +81,7 @@ def next_test(told: ForceAssessment) -> dict[str, Any]:
 
 
 def parting(told: ForceAssessment, names: Sequence[str]) -> str:
-    """Say which test parts effects that explain the points alike."""
+    """Say which test distinguishes effects that explain the points equally well."""
     by_name = {finding.effect.name: finding.effect for finding in told.findings}
     varied = {v for name in names for v in by_name[name].varies_with}
     conditions = sorted(varied - {"order"})
