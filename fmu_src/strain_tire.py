@@ -34,6 +34,7 @@ class StrainTire(GuardedSlave, Fmi2Slave):
         first, strains = len(fixed), self._samples * len(lateral)
         self._frame = slice(first, first + strains)
         self._conditions = slice(first + strains, first + strains + len(HELD))
+        self._omega = first + strains + HELD.index("omega")
         self._age = first + len(given) + [v.name for v in taken].index("age")
         return [*fixed, *given, *taken]
 
@@ -51,12 +52,15 @@ class StrainTire(GuardedSlave, Fmi2Slave):
         )
 
     def advance(self, step: float) -> bool:
-        """Push the frame; between estimates only the age changes."""
+        """Push the frame; tell what is out of range; between estimates only the age changes."""
         real, wheel = self.real, self.model
         count = self.other["samples"] if self._buffered else None
         changed: bool = wheel.step(
             real[self._frame], step, self.other["frame_valid"], *real[self._conditions], count=count
         )
+        if wheel.ended:
+            for kind, remark in wheel.remarks(real[self._omega]).items():
+                self.remark(kind, remark.text(kind))
         if not changed:
             age = wheel.age
             real[self._age] = age if age == age else real[self._missing]

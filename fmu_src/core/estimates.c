@@ -26,8 +26,7 @@ size_t estimate_scratch(const Calibration *calibration) {
     return (size_t)calibration->largest_cloud + 1;
 }
 
-/* The chain without the gage that is out; NULL if there is none. */
-static const Chain *chain_for(const Calibration *cal, const Features *features) {
+const Chain *chain_for(const Calibration *cal, const Features *features) {
     int out = 0, missing = ALL_GAGES;
     for (int g = cal->gages - 1; g >= 0; g--)
         if (features->gage_flags[g] & UNUSABLE) out++, missing = g;

@@ -37,6 +37,9 @@ size_t estimate_scratch(const Calibration *calibration);
 /* Whether the chain of all gages knows a quantity. Reference: Chain.has; test: test_native_wheel. */
 int quantity_calibrated(const Calibration *calibration, int quantity);
 
+/* The chain of the gages that work; NULL if there is none. */
+const Chain *chain_for(const Calibration *calibration, const Features *features);
+
 /* Reference: Calibration.estimate; test: test_native_estimates. */
 void estimate(const Calibration *calibration, const Turn *turn, const Features *features,
               double *scratch, Estimates *estimates);

@@ -43,26 +43,32 @@ double equivalent_load(const Laws *laws, double load, const double *values) {
     return needs_law(laws) && isfinite(ratio) && ratio > 0.0 ? load * ratio : load;
 }
 
-int pressure_allowed(const Laws *laws, const Constants *k, const double *values) {
+Ends pressure_range(const Laws *laws, const Constants *k) {
     double low = laws->pressure[0], high = laws->pressure[1];
-    if (laws->pressure_fitted) {
-        double slack = k->calibrated_slack * (high - low);
-        low -= slack;
-        high += slack;
-    } else {
-        low *= k->pressure_low;
-        high *= k->pressure_high;
-    }
-    return !(values[V_PRESSURE] < low) && !(values[V_PRESSURE] > high);
+    double slack = k->calibrated_slack * (high - low);
+    Ends law = {low * k->pressure_low, high * k->pressure_high};
+    Ends fitted = {low - slack, high + slack};
+    return laws->pressure_fitted ? fitted : law;
+}
+
+Ends speed_range(const Laws *laws, const Constants *k) {
+    Ends ends = {fmin(k->slowest, 0.95 * laws->speed[0]),
+                 laws->speed_fitted ? 1.05 * laws->speed[1] : k->fastest};
+    return ends;
+}
+
+int pressure_allowed(const Laws *laws, const Constants *k, const double *values) {
+    Ends ends = pressure_range(laws, k);
+    return !(values[V_PRESSURE] < ends.low) && !(values[V_PRESSURE] > ends.high);
 }
 
 int not_too_fast(const Laws *laws, const Constants *k, const double *values) {
-    return !(fabs(values[V_SPEED]) > (laws->speed_fitted ? 1.05 * laws->speed[1] : k->fastest));
+    return !(fabs(values[V_SPEED]) > speed_range(laws, k).high);
 }
 
 int speed_allowed(const Laws *laws, const Constants *k, const double *values) {
-    double slowest = fmin(k->slowest, 0.95 * laws->speed[0]);
-    return !(fabs(values[V_SPEED]) < slowest) && not_too_fast(laws, k, values);
+    int slow = fabs(values[V_SPEED]) < speed_range(laws, k).low;
+    return !slow && not_too_fast(laws, k, values);
 }
 
 int conditions_allowed(const Laws *laws, const Constants *k, const double *values) {

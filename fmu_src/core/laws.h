@@ -5,9 +5,16 @@
 
 #include "calibration.h"
 
+/* Lowest and highest value. */
+typedef struct {
+    double low, high;
+} Ends;
+
 double load_correction(const Laws *laws, const Constants *k, const double *values, double *std);
 double force_factor(const Laws *laws, const Constants *k, const double *values, double *std);
 double equivalent_load(const Laws *laws, double load, const double *values);
+Ends pressure_range(const Laws *laws, const Constants *k);
+Ends speed_range(const Laws *laws, const Constants *k);
 int pressure_allowed(const Laws *laws, const Constants *k, const double *values);
 int not_too_fast(const Laws *laws, const Constants *k, const double *values);
 int speed_allowed(const Laws *laws, const Constants *k, const double *values);

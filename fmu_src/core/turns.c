@@ -8,7 +8,6 @@
 static const double AFTER = 20.0 * (3.14159265358979323846 / 180.0);
 static const double OFFSET_HALF_WIDTH = 0.5, LARGEST_MISSING = 0.1, LARGEST_PERIOD_RATIO = 2.0;
 static const double DRIFT_SHARE = 0.05, MISSED_RATIO = 1.5, LARGEST_ANGLE_STD = 0.02;
-static const double LARGEST_OMEGA_RATIO = 1.5;
 static const double USUAL_CHANGE = 1.0, LONGEST_TURN = 3.0;
 
 /* The whole part of a sample number; -1 for what no sample number can be. */

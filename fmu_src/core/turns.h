@@ -29,6 +29,8 @@ typedef struct {
     double time[GAGES], value[GAGES];
 } Opposite;
 
+static const double LARGEST_OMEGA_RATIO = 1.5; /* of tirelib.signal.turns */
+
 /* Where the work on the first waiting contact stands. */
 enum { UNSEEN, WAITS_FOR_LAW, WAITS_FOR_END };
 

@@ -209,6 +209,8 @@ int wheel_step(Wheel *w, const double *frame, double step, int valid, const doub
     return WHEEL_FAULT;
 }
 
+const double *wheel_signs(const Wheel *w) { return SIGN[w->axes]; }
+
 /* Old values, no validity. Reference: Wheel._held_outputs */
 static void held_outputs(const Wheel *w, Outputs *out) {
     *out = w->live.shown;

@@ -63,6 +63,9 @@ int wheel_take(Wheel *wheel, const Column *columns, int64_t n, int64_t *taken);
 int wheel_step(Wheel *wheel, const double *frame, double step, int valid, const double *conditions,
                int count);
 
+/* Signs of Fz, alpha, kappa and Fy in the wheel's axes. */
+const double *wheel_signs(const Wheel *wheel);
+
 /* Reference: Wheel.outputs */
 void wheel_outputs(const Wheel *wheel, Outputs *outputs);
 

@@ -6,7 +6,7 @@
 #include "fmi2.h"
 
 /* Give a text to the importer as a printf format that shows it as it is. */
-static void tell(const void *functions, const char *name, const char *text) {
+static void tell(const void *functions, const char *name, const char *text, int warning) {
     const fmi2CallbackFunctions *host = functions;
     char format[2 * LINE + 1], *end = format;
     if (!host || !host->logger) return;
@@ -15,7 +15,8 @@ static void tell(const void *functions, const char *name, const char *text) {
         *end++ = *c;
     }
     *end = 0;
-    host->logger(host->environment, name, fmi2Error, "logStatusError", format);
+    host->logger(host->environment, name, warning ? fmi2Warning : fmi2Error,
+                 warning ? "logStatusWarning" : "logStatusError", format);
 }
 
 static const Dialect FMI2 = {tell, "fmuGUID", "fmuResourceLocation", "Real", "Integer"};

@@ -19,10 +19,12 @@ typedef struct {
     double time;
 } Instance;
 
-static void tell(const void *host, const char *name, const char *text) {
+static void tell(const void *host, const char *name, const char *text, int warning) {
     const Instance *c = host;
     (void)name;
-    if (c->log) c->log(c->environment, fmi3Error, "logStatusError", text);
+    if (c->log)
+        c->log(c->environment, warning ? fmi3Warning : fmi3Error,
+               warning ? "logStatusWarning" : "logStatusError", text);
 }
 
 static const Dialect FMI3 = {tell, "instantiationToken", "resourcePath", "Float64", "Int32"};

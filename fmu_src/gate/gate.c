@@ -101,10 +101,10 @@ static void tell(const Gate *g, fmi2Status status, fmi2String category, const ch
     free(format);
 }
 
-/* Take what pythonfmu logs: errors always, the rest as the importer wants it. */
+/* Take what pythonfmu logs: errors and warnings always, the rest as the importer wants it. */
 static void take(fmi2Environment environment, fmi2String name, fmi2Status status, fmi2String category, fmi2String text, ...) {
     const Gate *g = environment;
-    int wanted = status >= fmi2Error;
+    int wanted = status >= fmi2Warning;
     (void)name;
     if (!g->starting && text && !strncmp(text, TWICE, sizeof TWICE - 1)) return;
     if (!category || !*category) category = CATEGORIES[status];

@@ -2,10 +2,44 @@
  * Reference: tirelib.fmu.journal */
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "slave.h"
 
-void slave_tell(const Slave *s, const char *text) { s->dialect->tell(s->host, s->name, text); }
+void slave_tell(const Slave *s, const char *text) { s->dialect->tell(s->host, s->name, text, 0); }
+
+/* Write what stands for a placeholder of a text; returns its length, 0 if there is none. */
+static size_t filled(const char *text, const char *const word[4], const char *const value[4],
+                     const char **found) {
+    for (int i = 0; i < 4; i++)
+        if (!strncmp(text, word[i], strlen(word[i]))) {
+            *found = value[i];
+            return strlen(word[i]);
+        }
+    return 0;
+}
+
+/* Reference: Remark.text */
+void slave_remark(Slave *s, int kind, const Remark *r) {
+    static const char *const WORD[4] = {"{name}", "{value}", "{low}", "{high}"};
+    char line[LINE], number[3][32];
+    const double given[3] = {r->value, r->low, r->high};
+    const char *value[4] = {s->own.remark[REMARKS + r->name], number[0], number[1], number[2]};
+    size_t n = 0;
+    if (s->remarked & (1u << kind)) return;
+    s->remarked |= 1u << kind;
+    for (int i = 0; i < 3; i++) snprintf(number[i], sizeof number[i], "%g", given[i]);
+    for (const char *c = s->own.remark[kind], *found = c; *c && n < LINE - 1;) {
+        size_t taken = filled(c, WORD, value, &found);
+        if (taken)
+            n += (size_t)snprintf(line + n, LINE - n, "%s", found);
+        else
+            line[n++] = *c;
+        c += taken ? taken : 1;
+    }
+    line[n < LINE ? n : LINE - 1] = 0;
+    s->dialect->tell(s->host, s->name, line, 1);
+}
 
 static int power_of_ten(unsigned n) {
     while (n % 10 == 0) n /= 10;

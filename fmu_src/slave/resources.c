@@ -91,18 +91,23 @@ static int undamaged(const char *hash, const char *rest, size_t n) {
 /* Take the lines behind the first; returns whether they are complete. */
 static int lines_read(Resources *r, char **at, const char *end) {
     const char *count;
+    char *behind;
     r->guid = line(at, end);
     r->tire = line(at, end);
     count = line(at, end);
     if (!r->guid || !r->tire || !count) return 0;
-    r->variables = strtoul(count, NULL, 10);
-    if (r->variables > (size_t)(end - *at)) return 0;
-    r->variable = calloc(r->variables + 1, sizeof *r->variable);
-    for (size_t i = 0; r->variable && i < r->variables; i++) {
+    r->variables = strtoul(count, &behind, 10);
+    r->remarks = strtoul(behind, NULL, 10);
+    size_t most = (size_t)(end - *at);
+    if (r->variables > most || r->remarks > most) return 0;
+    r->variable = calloc(r->variables + r->remarks + 1, sizeof *r->variable);
+    if (!r->variable) return 0;
+    r->remark = r->variable + r->variables;
+    for (size_t i = 0; i < r->variables + r->remarks; i++) {
         r->variable[i] = line(at, end);
-        if (!r->variable[i] || strlen(r->variable[i]) < 3) return 0;
+        if (!r->variable[i] || (i < r->variables && strlen(r->variable[i]) < 3)) return 0;
     }
-    return r->variable != NULL;
+    return 1;
 }
 
 const char *resources_read(Resources *r, const char *path) {

@@ -1,8 +1,9 @@
 /* Files that the core reads: what an FMU carries, and other calibrations.
  *
  * Lines of text, then doubles. The lines: the format (in an FMU, with the hash of all that follows),
- * the GUID (for no FMU: the table's hash), the tire's name, how many variables there are, then one line each: R, I, B or S for its type, p, i or
- * o for parameter, input or output, and its name. The doubles: samples of a frame, whether it is
+ * the GUID (for no FMU: the table's hash), the tire's name, how many variables and texts for the log
+ * there are (the latter not in older files), then one line each: R, I, B or S for its type, p, i or
+ * o for parameter, input or output, and its name; or the text. The doubles: samples of a frame, whether it is
  * buffered, sample rate, what stands for a missing value, then the calibration's table. Written by
  * tirelib.fmu.native. */
 #ifndef TIRE_RESOURCES_H
@@ -14,8 +15,8 @@
 typedef struct {
     char *memory; /* of all texts */
     const char *guid, *tire;
-    size_t variables;
-    const char **variable;
+    size_t variables, remarks;
+    const char **variable, **remark;
     double samples, buffered, rate, missing;
     double *table;
     size_t numbers;

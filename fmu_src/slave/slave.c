@@ -74,7 +74,7 @@ void slave_reset(Slave *s) {
     memset(s->text, 0, sizeof s->text);
     s->phase = INSTANTIATED;
     s->refused = s->announced = s->running = 0;
-    s->causes = 0;
+    s->causes = s->remarked = 0;
     s->model->first(s);
 }
 

@@ -10,6 +10,7 @@
 
 #include <stdint.h>
 
+#include "../core/remarks.h"
 #include "../core/state.h"
 #include "../tire/rolling.h"
 #include "resources.h"
@@ -22,7 +23,7 @@ enum { DONE = 0, FAILED = 3 }; /* statuses, alike in FMI 2 and 3 */
 /* How a version of FMI tells a text, and what it calls identifier, place of the resources, types.
  */
 typedef struct {
-    void (*tell)(const void *host, const char *name, const char *text);
+    void (*tell)(const void *host, const char *name, const char *text, int warning);
     const char *guid, *place, *real, *integer;
 } Dialect;
 
@@ -66,7 +67,7 @@ struct Slave {
     char text[PARAMETERS][TEXT];
     char rolling[16], status[LINE], cause[LINE];
     uint64_t told[CAUSES];
-    unsigned times[CAUSES], causes;
+    unsigned times[CAUSES], causes, remarked; /* remarked: a bit for each kind that was told */
 };
 
 /* A state: variables and parameters, then the wheel's, then a hash of them and of the FMU's GUID. */
@@ -85,6 +86,9 @@ void slave_free(Slave *s);
 void slave_tell(const Slave *s, const char *text);
 void slave_complain(Slave *s, const char *cause);
 int slave_failed(Slave *s, const char *format, ...);
+
+/* Tell, as a warning and once for each kind, what is out of range. */
+void slave_remark(Slave *s, int kind, const Remark *remark);
 
 /* Add a word to the status, by semicolons; one with the cause, without the semicolon. */
 void slave_add(Slave *s, const char *word);

@@ -26,6 +26,14 @@ static const char *const NOTES[] = {"Fz_out_of_range",         "alpha_out_of_ran
                                     "pressure_out_of_range",   "speed_out_of_range",
                                     "camber_out_of_range"};
 
+/* Tell what of a turn that has just ended is out of range. Reference: StrainTire.advance */
+static void tell_remarks(Slave *s) {
+    Remark remark[REMARKS];
+    wheel_remarks(s->wheel, s->real[s->conditions + OMEGA], remark);
+    for (int kind = 0; kind < REMARKS; kind++)
+        if (remark[kind].holds) slave_remark(s, kind, &remark[kind]);
+}
+
 /* Write the outputs. Reference: GuardedSlave.publish, StrainTire.shown */
 static void publish(Slave *s) {
     Outputs out;
@@ -43,6 +51,7 @@ static void publish(Slave *s) {
     *to++ = out.age;
     for (double *x = s->real + s->outputs; x < to; x++)
         if (isnan(*x)) *x = missing;
+    if (*whole != (int)out.turn && (out.notes || (out.flags & OMEGA_MISMATCH))) tell_remarks(s);
     *whole++ = (int)out.turn;
     *whole++ = out.flags;
     *whole++ = out.valid;
@@ -236,7 +245,7 @@ static int place(Slave *s) {
     s->outputs = s->conditions + HELD + 1 + (size_t)s->buffered;
     s->reals = 2 * QUANTITIES + 2 * (size_t)s->gages + 4;
     s->count = s->outputs + s->reals + 2 + 1 + QUANTITIES + 2;
-    return 1;
+    return s->own.remarks == REMARKS + VALUES;
 }
 
 static size_t size(const Slave *s) { return state_size(s->wheel); }

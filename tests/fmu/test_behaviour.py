@@ -1,5 +1,6 @@
 """Laws of the running FMU: it is the library, and no fault reaches the importer as a crash."""
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -246,7 +247,11 @@ def test_a_condition_that_cannot_be_is_named_and_what_depends_on_it_is_not_valid
 ) -> None:
     ten.start(live.RATE)
     seen = [v for v in play(ten, strain(), held(**known)) if v["turn"] > 1]
-    assert seen
+    assert len(seen) > 1
+    name = note.removesuffix("_out_of_range")
+    (said,) = ten.messages
+    assert said.startswith(f"{note}: {name} [")
+    assert f"= {abs(known[name]) if name == 'speed' else known[name]:g}; the calibration" in said
     assert not any(v["valid"] for v in seen)
     for values in seen:
         assert {note, "out_of_range"} <= set(values["status"].split(";"))
@@ -261,6 +266,13 @@ def test_a_turn_rate_that_contradicts_the_contacts_is_named_and_nothing_is_valid
     ten.start(live.RATE)
     last = play(ten, strain(), held(omega=factor * rate))[-1]
     assert last["status"] == "omega_mismatch"
+    (said,) = ten.messages
+    low, high = (f"{share * rate:.3g}" for share in (1.0 / 1.5, 1.5))
+    found = re.fullmatch(
+        r"omega_mismatch: omega \[rad/s\] = (\S+); .* is (\S+) \.\. (\S+); .*", said
+    )
+    assert found
+    assert [f"{float(x):.3g}" for x in found.groups()] == [f"{factor * rate:.3g}", low, high]
     assert not any(last[f"{name}_valid"] for name in QUANTITIES)
     ten.start(live.RATE)
     assert play(ten, strain(), held(omega=1.2 * rate))[-1]["valid"]

@@ -216,11 +216,13 @@ def run(context: click.Context, file: Path, folder: Path, json_file: Path | None
     campaign = read_campaign(folder)
     with LoadedFmu(file) as loaded, progress_bar("stepping", len(campaign.plans)) as progress:
         observations, estimates = play_campaign(loaded, campaign, progress)
-        own = loaded.calibration
+        own, told = loaded.calibration, loaded.told.values()
     features = observe([campaign], low_pass=LowPass(own.order, own.cut_off)).features
     costs = costs_of(own, features, own.estimate(features))  # an FMU puts out no features
     document = estimate_document(observations, estimates, own, costs)
     print_document(campaign.header.name, document, own)
+    for text in told:
+        output().print(f"log of the FMU: {text}", markup=False)
     if json_file is not None:
         write_json(json_file, document)
         output().print(f"written: {json_file}")

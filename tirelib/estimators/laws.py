@@ -129,24 +129,33 @@ class ConditionLaws:
 
     def pressure_allowed(self, values: Mapping[str, FloatArray]) -> BoolArray:
         """Tell which turns have a pressure for which the calibration holds; unknown ones have."""
-        low, high = self.pressure
-        if not self.pressure_fitted:
-            low, high = low * PRESSURE_ENVELOPE[0], high * PRESSURE_ENVELOPE[1]
-        else:
-            slack = CALIBRATED_SLACK * (high - low)
-            low, high = low - slack, high + slack
+        low, high = self.pressure_range
         good = ~(values["pressure"] < low) & ~(values["pressure"] > high)
         return np.asarray(good, dtype=np.bool_)
 
+    @property
+    def pressure_range(self) -> tuple[float, float]:
+        """Lowest and highest pressure for which the calibration holds, [Pa]."""
+        low, high = self.pressure
+        if not self.pressure_fitted:
+            return low * PRESSURE_ENVELOPE[0], high * PRESSURE_ENVELOPE[1]
+        slack = CALIBRATED_SLACK * (high - low)
+        return low - slack, high + slack
+
+    @property
+    def speed_range(self) -> tuple[float, float]:
+        """Lowest and highest speed for which the calibration holds, [m/s]."""
+        fastest = 1.05 * self.speed[1] if self.speed_fitted else FASTEST
+        return float(np.fmin(SLOWEST, 0.95 * self.speed[0])), fastest
+
     def not_too_fast(self, values: Mapping[str, FloatArray]) -> BoolArray:
         """Tell which turns are no faster than the calibration holds; unknown ones are not."""
-        fastest = 1.05 * self.speed[1] if self.speed_fitted else FASTEST
-        return np.asarray(~(np.abs(values["speed"]) > fastest), dtype=np.bool_)
+        return np.asarray(~(np.abs(values["speed"]) > self.speed_range[1]), dtype=np.bool_)
 
     def speed_allowed(self, values: Mapping[str, FloatArray]) -> BoolArray:
         """Tell which turns have a speed for which the calibration holds; unknown ones have."""
-        slowest = np.fmin(SLOWEST, 0.95 * self.speed[0])
-        good = ~(np.abs(values["speed"]) < slowest) & self.not_too_fast(values)
+        slow = np.abs(values["speed"]) < self.speed_range[0]
+        good = ~slow & self.not_too_fast(values)
         return np.asarray(good, dtype=np.bool_)
 
     def spread(self, values: Mapping[str, FloatArray], value: FloatArray) -> FloatArray:

@@ -83,7 +83,9 @@ def pack(
     computing |= {f"sources/{name}": source_file(name).read_bytes() for name in sources}
     if spec.fmi == 3:
         computing["sources/buildDescription.xml"] = build_description(spec.model, sources)
-    identity = identity_of(spec, {**computing, "data": data.tobytes()})
+    identity = identity_of(
+        spec, {**computing, "data": data.tobytes(), "texts": "\n".join(spec.texts)}
+    )
     usual = {"buffered": 0.0, "missing": math.nan}
     core = hashed_file(
         title,
@@ -94,6 +96,7 @@ def pack(
             float(spec.settings.get(name, usual.get(name, math.nan)))
             for name in ("samples_per_step", "buffered", "sample_rate", "missing")
         ],
+        texts=spec.texts,
     )
     files = {
         **computing,
@@ -145,9 +148,10 @@ def hashed_file(
     guid: str,
     table: Sequence[Variable] = (),
     numbers: Sequence[float] = NO_FRAME,
+    texts: Sequence[str] = (),
 ) -> bytes:
     """Return such a file whose first line holds the hash of all that follows."""
-    file = resource_file(title, data, guid=guid, table=table, numbers=numbers)
+    file = resource_file(title, data, guid=guid, table=table, numbers=numbers, texts=texts)
     rest = file.removeprefix(f"{FORMAT}\n".encode())
     return f"{FORMAT} {_hash(rest):016x}\n".encode() + rest
 
@@ -159,6 +163,7 @@ def resource_file(
     guid: str = "-",
     table: Sequence[Variable] = (),
     numbers: Sequence[float] = NO_FRAME,
+    texts: Sequence[str] = (),
 ) -> bytes:
     """Return the file that the core reads: lines of text, then doubles, least byte first.
 
@@ -175,6 +180,8 @@ def resource_file(
     numbers : four floats
         Samples of a frame, whether it is buffered, sample rate [Hz], what stands for a missing
         value.
+    texts : sequence of str
+        What is logged, a line each.
 
     Raises
     ------
@@ -183,8 +190,8 @@ def resource_file(
     """
     if "\n" in title:
         raise FormatError(f"tire = {title!r}; a name of one line is needed; mend it")
-    lines = [FORMAT, guid, title, str(len(table))]
-    lines += [f"{v.kind[0]}{v.causality[0]}{v.name}" for v in table]
+    lines = [FORMAT, guid, title, f"{len(table)} {len(texts)}"]
+    lines += [*(f"{v.kind[0]}{v.causality[0]}{v.name}" for v in table), *texts]
     values = np.concatenate((np.array(numbers, dtype=np.float64), data))
     return "\n".join((*lines, "")).encode() + values.astype("<f8").tobytes()
 

@@ -50,6 +50,9 @@ def keeping(messages: list[str]) -> Any:
 class LoadedFmu:
     """One instance of a ``StrainTire.fmu`` in FMPy; use it in a ``with`` block.
 
+    `messages` are those since the last start, `told` the first of each kind in a campaign that was
+    played, with its run.
+
     Raises
     ------
     FormatError
@@ -68,6 +71,7 @@ class LoadedFmu:
         self.path = Path(path)
         self.calibration = embedded_calibration(path)
         self.messages: list[str] = []
+        self.told: dict[str, str] = {}
         try:
             description = read_model_description(str(path))
         except Exception as error:  # FMPy raises bare exceptions
@@ -247,6 +251,8 @@ def play_campaign(
     truth: dict[str, list[FloatArray]] = {name: [] for name in TRUTH}
     for run in campaign.runs():
         found = list(play_run(fmu, run))
+        for text in fmu.messages:
+            fmu.told.setdefault(text.split(":")[0], f"run {run.plan.run}: {text}")
         for values in found:
             values["contact_time"] += run.start_time
             values["ready"] += run.start_time

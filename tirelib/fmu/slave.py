@@ -82,6 +82,7 @@ class GuardedSlave:
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self.journal = Journal()
+        self._remarked: set[str] = set()
         self.folder = Path(kwargs["resources"])
         _once_in_path(str(kwargs["resources"]))
         self.settings = json.loads((self.folder / "settings.json").read_text(encoding="utf-8"))
@@ -340,6 +341,12 @@ class GuardedSlave:
         line = self.journal.line(cause)
         if line is not None:
             self.log(line, self.fmi.enums.Fmi2Status.error)
+
+    def remark(self, kind: str, text: str) -> None:
+        """Log a warning, once for each kind."""
+        if kind not in self._remarked:
+            self._remarked.add(kind)
+            self.log(text, self.fmi.enums.Fmi2Status.warning, "logStatusWarning")
 
     @guarded
     def _get_fmu_state(self) -> dict[str, Any]:

@@ -35,6 +35,8 @@ class SlaveSpec:
         Names of the variables that the outputs at the start depend on; None: maybe all.
     fmi : int
         Version of FMI, 2 or 3.
+    texts : sequence of str, optional
+        What the compiled slave logs, see `tirelib.fmu.remarks`.
     """
 
     model: str
@@ -48,3 +50,4 @@ class SlaveSpec:
     icon: bytes = field(repr=False)
     start_depends_on: Sequence[str] | None = None
     fmi: int = 2
+    texts: Sequence[str] = ()

@@ -7,11 +7,13 @@ from typing import Any
 
 from tirelib.errors import ParameterError
 from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.core_table import VALUES
 from tirelib.flags import INVALIDATING, TurnFlag
 from tirelib.fmu.describe3 import CLOCK, JOINED, joined
 from tirelib.fmu.handbook import html_table, page
 from tirelib.fmu.parts import source_file
 from tirelib.fmu.reference import FOLDER
+from tirelib.fmu.remarks import lines
 from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.strain_reference import strain_reference
 from tirelib.fmu.variables import MISSING, Variable, inputs, outputs, parameters
@@ -108,6 +110,7 @@ def strain_tire(
         icon=source_file("strain_tire.png").read_bytes(),
         start_depends_on=(MISSING,),
         fmi=fmi,
+        texts=(*lines(), *VALUES),
     )
 
 

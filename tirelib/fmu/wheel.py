@@ -15,6 +15,7 @@ from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.flags import TurnFlag, flag_names
 from tirelib.fmu.refusals import FAULT, StepError, status_entry
+from tirelib.fmu.remarks import Remark, remarks
 from tirelib.signal.turns import LONGEST_TURN
 from tirelib.stream.estimate import TurnEstimate
 from tirelib.stream.reference import NumpyEstimator
@@ -55,6 +56,7 @@ class Wheel:
         self.samples = samples
         self._known_step = math.nan, 0  # a communication step [s] and its samples
         self._seen: tuple[int, bool] | None = None
+        self.ended = False  # whether the last step has ended a turn
         self._offset = 0.0  # time at which the estimator was started again, after a fault
         self._turns = 0  # turns before that
         self._fault = False
@@ -121,9 +123,11 @@ class Wheel:
             If the step or the count is not allowed; nothing has changed.
         """
         n = self.samples_in(step) if count is None else self._counted(step, count)
+        self.ended = False
         if n:
             known = [value if math.isfinite(value) else math.nan for value in conditions]
             turns = self._estimator.take(self._strain(frame, n, valid), known)
+            self.ended = bool(turns)
             if turns:
                 self._fault, self._held = False, None
         else:
@@ -151,6 +155,18 @@ class Wheel:
                 "many samples of the frame are new"
             )
         return count
+
+    def remarks(self, omega: float) -> dict[str, Remark]:
+        """Return by kind what is out of range in the last turn.
+
+        Parameters
+        ----------
+        omega : float, [rad/s]
+            Turn rate that is given now.
+        """
+        latest = self._estimator.latest
+        known = self._estimator.calibration
+        return {} if latest is None else remarks(known, latest, self._sign, omega)
 
     def fault(self, cause: str) -> None:
         """Hold the last values as invalid and start the estimator again, after an error."""
