@@ -29,7 +29,7 @@ from tirelib.estimators import likeness
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.likeness import DRIFT, suspected
-from tirelib.estimators.regressors import ODD, compute_regressors
+from tirelib.estimators.regressors import SIDED, compute_regressors
 from tirelib.estimators.result import other_tire
 from tirelib.estimators.train import train
 from tirelib.flags import TurnFlag
@@ -60,20 +60,21 @@ def drifting() -> Plan:
 
 def shifts(calibration: Calibration, seen: Observations) -> Mapping[str, tuple[float, float]]:
     """Return the shift of each regressor per doubled pressure, and per (40 m/s)^2."""
-    known = calibration.chains[-1].likeness
-    if known is None:
+    full = calibration.chains[-1]
+    if full.likeness is None or full.agreement is None:
         raise SystemExit("too few conditions")
+    names = (*full.likeness.names, *full.agreement.names)
     values = compute_regressors(seen.features, range(seen.features.lateral.size))
     values["speed_squared"] = values["speed"] ** 2
-    rest = known.rest(values)
+    rest = np.hstack([known.rest(values) for known in (full.likeness, full.agreement)])
     use = seen.usable & np.isfinite(rest).all(axis=1)
     pressure = values["pressure"] / PRESSURE - 1.0
     speed = (values["speed_squared"] - SPEED**2) / 1600.0
     cornering = np.abs(seen.truth["slip_angle"]) > np.deg2rad(1.0)
     found = {}
-    for column, name in enumerate(known.names):
-        side = np.where(name in ODD, np.sign(seen.truth["slip_angle"]), 1.0)
-        rows = use & cornering if name in ODD else use
+    for column, name in enumerate(names):
+        side = np.where(name in SIDED, np.sign(seen.truth["slip_angle"]), 1.0)
+        rows = use & cornering if name in SIDED else use
         design = np.stack((np.ones_like(pressure), pressure, speed), axis=1) * side[:, None]
         answer = np.linalg.lstsq(design[rows], rest[rows, column], rcond=None)[0]
         found[name] = (float(answer[1]), float(answer[2]))

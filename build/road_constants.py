@@ -27,7 +27,7 @@ from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.edge import EDGE_UNIT
 from tirelib.estimators.likeness import DRIFT
-from tirelib.estimators.regressors import ODD, compute_regressors
+from tirelib.estimators.regressors import SIDED, compute_regressors
 from tirelib.estimators.unknowns import UNDER_GROOVES
 from tirelib.observations import Observations, mean_by, observe
 from tirelib.rig.plans import Plan
@@ -158,20 +158,22 @@ def shifts(name: str, seed: int, out: Path, jobs: int) -> np.ndarray:
     )
     worn = observe([read_campaign(out / f"worn-{name}-{seed}")])
     full = read_calibration(out / f"{name}-{seed}" / "calibration.toml").chains[-1]
-    if full.likeness is None or full.sliding is None:
+    if full.likeness is None or full.agreement is None or full.sliding is None:
         raise SystemExit(f"{name}: run build/road_coverage.py for this tire first")
     found = []
     for seen in (worn, slid):
         use, truth = seen.usable, seen.truth
         values = compute_regressors(seen.features, range(5))
-        rest = full.likeness.rest({**values, "speed_squared": values["speed"] ** 2})[use]
+        every = {**values, "speed_squared": values["speed"] ** 2}
+        known = (full.likeness, full.agreement)
+        rest = np.hstack([one.rest(every) for one in known])[use]
         lost = own.tread_thickness - NEW_DEPTH + seen.features.tread_depth
         at = np.abs(truth["slip_angle"]), truth["Fz"]
         share = full.sliding.forward(*at, seen.features.friction)[3]
         share = share - full.sliding.forward(*at, full.sliding.friction)[3]
         side = np.where(truth["slip_angle"] < 0.0, -1.0, 1.0)
         column = (np.log(own.tread_thickness / lost) if seen is worn else share)[use]
-        odd = np.array([regressor in ODD for regressor in full.likeness.names])
+        odd = np.array([regressor in SIDED for one in known for regressor in one.names])
         even = np.stack((np.ones_like(column), column), axis=1)
         sided = column * side[use]
         shift = np.linalg.lstsq(even, rest, rcond=None)[0][1]

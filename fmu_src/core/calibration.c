@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-static const double MAGIC = 20220117.0, VERSION = 1.0;
+static const double MAGIC = 20220117.0, VERSION = 2.0;
 
 /* What is left of a table; `bad` once something did not fit. */
 typedef struct {
@@ -156,7 +156,7 @@ static Chain chain(Reader *r, int gages) {
     c.gages = whole(r, 2, gages);
     for (int g = 0; g < c.gages; g++) c.gage[g] = whole(r, 0, gages - 1);
     c.line = taken(r, 2 * (size_t)c.gages);
-    c.parabola = taken(r, (size_t)c.gages);
+    c.highest = taken(r, 3 * (size_t)c.gages);
     c.needs_pressure = whole(r, 0, 1);
     c.needs_camber = whole(r, 0, 1);
     c.needs_speed = whole(r, 0, 1);
@@ -184,6 +184,7 @@ static Chain chain(Reader *r, int gages) {
     c.sliding = sliding(r);
     c.cloud = cloud(r);
     c.likeness = likeness(r);
+    c.agreement = likeness(r);
     return c;
 }
 

@@ -89,7 +89,7 @@ enum { RANGE_NUMBER, RANGE_LOW, RANGE_HIGH, RANGE_OPTIONAL, RANGE_WIDTH };
 /* tirelib.estimators.chain.Chain, and what follows from its ranges. */
 typedef struct {
     int there, gages, gage[GAGES];
-    const double *line, *parabola; /* fitting matrices: 2 and 1 rows of `gages` */
+    const double *line, *highest; /* fitting matrices: 2 rows of `gages`, 3 for degrees 2 to 4 */
     int needs_pressure, needs_camber, needs_speed, force_knows_camber, radius_knows_load;
     double mean_load, load_per_hardening, widest, camber[2];
     Guard guard[QUANTITIES];
@@ -99,7 +99,7 @@ typedef struct {
     double blur, bend;
     SlidingCurve sliding;
     Cloud cloud;
-    Likeness likeness;
+    Likeness likeness, agreement;
 } Chain;
 
 typedef struct {

@@ -264,10 +264,10 @@ void chain_predict(const Calibration *calibration, const Chain *c, double *value
             if (q != KAPPA) result->of[q].valid = 0;
 }
 
-int chain_unlike(const Calibration *calibration, const Chain *c, double values[3][VALUES],
-                 const Prediction *found, double angle_std) {
+/* Whether a turn shows what one of the two does not know. */
+static int unlike(const Calibration *calibration, const Chain *c, const Likeness *l,
+                  double values[3][VALUES], const Prediction *found, double angle_std) {
     const Constants *k = &calibration->constants;
-    const Likeness *l = &c->likeness;
     double here[NAMES], longer[NAMES], higher[NAMES];
     Look look;
     if (!l->there) return 0;
@@ -291,4 +291,10 @@ int chain_unlike(const Calibration *calibration, const Chain *c, double values[3
     look.moves[0] = longer;
     look.moves[1] = higher;
     return likeness_apart(l, k, &look) > l->limit;
+}
+
+int chain_unlike(const Calibration *calibration, const Chain *c, double values[3][VALUES],
+                 const Prediction *found, double angle_std) {
+    return unlike(calibration, c, &c->likeness, values, found, angle_std) ||
+           unlike(calibration, c, &c->agreement, values, found, angle_std);
 }

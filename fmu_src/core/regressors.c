@@ -20,9 +20,13 @@ static double slope(const Chain *c, const double *row) {
     return fitted(c->line + c->gages, row, c->gages);
 }
 
-static double bow(const Chain *c, const double *row) {
-    return c->gages < 3 ? NAN : fitted(c->parabola, row, c->gages);
+/* Highest coefficient of a polynomial over the gages. */
+static double highest(const Chain *c, const double *row, int degree) {
+    const double *matrix = c->highest + (degree - 2) * c->gages;
+    return c->gages <= degree ? NAN : fitted(matrix, row, c->gages);
 }
+
+static double bow(const Chain *c, const double *row) { return highest(c, row, 2); }
 
 /* Reference: with_moved, of what the regressors are made of. */
 static void move(const Turn *turn, int gages, double step, int moved, Features *f) {
@@ -84,6 +88,13 @@ void compute_regressors(const Calibration *cal, const Chain *c, const Turn *turn
     v[V_TP_BOW] = bow(c, tp) / scale;
     v[V_CP1_BOW] = bow(c, cp1) / scale;
     v[V_CP2_BOW] = bow(c, cp2) / scale;
+    for (int degree = 3; degree <= 4; degree++) {
+        double *left = v + (degree == 3 ? V_ANGLE_TWIST : V_ANGLE_WAVE);
+        left[0] = highest(c, angle, degree);
+        left[1] = highest(c, cp1, degree) / scale;
+        left[2] = highest(c, cp2, degree) / scale;
+        left[3] = highest(c, tp, degree) / scale;
+    }
     v[V_FULLNESS] = level(c, vertical) / scale;
     v[V_SKEW] = level(c, skew);
     v[V_STEEPNESS] = 0.5 * level(c, sum) / scale;

@@ -88,6 +88,7 @@ void wheel_remarks(const Wheel *w, double omega, Remark r[REMARKS]) {
         r[OMEGA_REMARK] =
             remark_of(omega, rate / LARGEST_OMEGA_RATIO, rate * LARGEST_OMEGA_RATIO, 0);
     }
+    if (w->live.latest.flags & OTHER_TIRE) r[OTHER_TIRE_REMARK] = remark_of(NAN, NAN, NAN, 0);
     if (any(r) || !out || !c) return;
     own(w, c, out, r);
     if (!any(r)) of_strain(w, c, out, r);

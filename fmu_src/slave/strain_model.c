@@ -51,7 +51,8 @@ static void publish(Slave *s) {
     *to++ = out.age;
     for (double *x = s->real + s->outputs; x < to; x++)
         if (isnan(*x)) *x = missing;
-    if (*whole != (int)out.turn && (out.notes || (out.flags & OMEGA_MISMATCH))) tell_remarks(s);
+    if (*whole != (int)out.turn && (out.notes || (out.flags & (OMEGA_MISMATCH | OTHER_TIRE))))
+        tell_remarks(s);
     *whole++ = (int)out.turn;
     *whole++ = out.flags;
     *whole++ = out.valid;

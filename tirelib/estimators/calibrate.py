@@ -19,6 +19,7 @@ from tirelib.estimators.fit_links import fit_drag, fit_force, fit_load, fit_mome
 from tirelib.estimators.fit_sliding import Runs, fit_sliding
 from tirelib.estimators.floor import with_floor
 from tirelib.estimators.laws import ConditionLaws
+from tirelib.estimators.likeness import AGREEMENT
 from tirelib.estimators.likeness_fit import fit_likeness
 from tirelib.estimators.links import VARIES, Links, varying_of
 from tirelib.estimators.ranges import with_ranges
@@ -91,9 +92,9 @@ def calibrate_chain(
         road=_road(links),
     )
     turns = {**regressors, "speed_squared": regressors["speed"] ** 2}
+    seen = (values, groups, varying_of(values, list(VARIES)), turns, unit, rows)
     chain = replace(
-        chain,
-        likeness=fit_likeness(values, groups, varying_of(values, list(VARIES)), turns, unit, rows),
+        chain, likeness=fit_likeness(*seen), agreement=fit_likeness(*seen, names=AGREEMENT)
     )
     return with_ranges(with_floor(chain, regressors, unit, rows), values, truth), links
 

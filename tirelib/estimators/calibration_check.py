@@ -37,7 +37,7 @@ TABLES = ("geometry_m", "filter", "rolling", "chain", "reference_turn")
 of these."""
 PARTS = (
     *("missing_gage", "gages", "mean_load", "laws", "force_laws", "road", "range"),
-    *("cloud", "sliding", "likeness", *UNITS),
+    *("cloud", "sliding", "likeness", "agreement", *UNITS),
 )
 """What a chain may hold."""
 MODEL = ("unit", "residual", "floor", "pulled", "border", "variable", "term", "covariance")
@@ -106,8 +106,9 @@ def _chain(chain: Any, where: str, gages: int) -> Iterator[str]:
             yield from _unknown(chain[name], f"{where}.{name}", known)
     if "alpha" in chain:
         yield from _numbers(chain, "alpha", ("blur", "bend"), where)
-    if "likeness" in chain:
-        yield from _likeness(chain["likeness"], f"{where}.likeness")
+    for name in ("likeness", "agreement"):
+        if name in chain:
+            yield from _likeness(chain[name], f"{where}.{name}")
     if "cloud" in chain:
         yield from _cloud(chain["cloud"], f"{where}.cloud")
     if "road" in chain:

@@ -180,6 +180,8 @@ def _chain_table(chain: Chain) -> dict[str, Any]:
     }
     if chain.likeness is not None:
         table["likeness"] = _likeness_table(chain.likeness)
+    if chain.agreement is not None:
+        table["agreement"] = _likeness_table(chain.agreement)
     for name, model in models.items():
         if model is not None:
             table[name] = _polynomial_table(model, _MODEL_UNITS[name])
@@ -254,6 +256,7 @@ def _chain(table: Mapping[str, Any]) -> Chain:
         sliding=_sliding(table, angle),
         road=Road(**{name: _pair(pair) for name, pair in table.get("road", {}).items()}),
         likeness=_likeness(table["likeness"]) if "likeness" in table else None,
+        agreement=_likeness(table["agreement"]) if "agreement" in table else None,
     )
 
 

@@ -76,6 +76,9 @@ class Chain:
         Friction and tread of the calibration.
     likeness : Likeness or None
         What turns of the calibrated tire look like; None where too few conditions were measured.
+    agreement : Likeness or None
+        What the gages leave over the width beyond level, slope and bow: gages that are mixed up, or
+        one that is disturbed, do not agree.
     """
 
     gages: tuple[int, ...]
@@ -93,6 +96,7 @@ class Chain:
     sliding: SlidingCurve | None = None
     road: Road = field(default_factory=Road)
     likeness: Likeness | None = None
+    agreement: Likeness | None = None
 
     def has(self, quantity: str) -> bool:
         """Tell whether a quantity is calibrated."""
@@ -121,7 +125,7 @@ class Chain:
         found: Mapping[str, Estimate],
         angle_std: FloatArray,
     ) -> BoolArray:
-        """Tell which turns show strain that the calibrated tire does not, shape (n,).
+        """Tell which turns show strain that the calibrated tire's gages do not, shape (n,).
 
         Parameters
         ----------
@@ -132,10 +136,7 @@ class Chain:
         angle_std : array, shape (n,), [1]
         """
         n = angle_std.size
-        if self.likeness is None:
-            return np.zeros(n, dtype=np.bool_)
         every = {**moved, "speed_squared": moved["speed"] ** 2}
-        moves = moved_by(self.likeness.rest(every), angle_std)
         values = {name: x[:n] for name, x in every.items()}
         sliding = None
         if {"Fz", "Fy"} <= set(found) and found["Fy"].sliding is not None:
@@ -144,10 +145,15 @@ class Chain:
             sliding = side * share
         tread = self.road.hardened(values)
         camber = np.where(np.isnan(values["camber"]), tilt.USUAL, 0.0)
-        apart = self.likeness.apart(
-            values, self.laws, tread, sliding, moves, camber, self.force_laws
-        )
-        return np.asarray(apart > self.likeness.limit, dtype=np.bool_)
+        unlike = np.zeros(n, dtype=np.bool_)
+        for known in (self.likeness, self.agreement):
+            if known is not None:
+                moves = moved_by(known.rest(every), angle_std)
+                apart = known.apart(
+                    values, self.laws, tread, sliding, moves, camber, self.force_laws
+                )
+                unlike |= apart > known.limit
+        return unlike
 
     def predict(
         self, regressors: Mapping[str, FloatArray]

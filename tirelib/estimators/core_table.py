@@ -32,7 +32,7 @@ from tirelib.estimators.chain import Chain
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, Term, Variable
 
-MAGIC, VERSION = 20220117.0, 1.0
+MAGIC, VERSION = 20220117.0, 2.0
 """First numbers of a table; a core refuses others."""
 VALUES = (
     *("contact_angle", "compression", "traction", "tension"),
@@ -40,6 +40,8 @@ VALUES = (
     *("angle_bow", "tp_bow", "cp1_bow", "cp2_bow", "fullness", "skew"),
     *("steepness", "steepness_change", "lead_bend", "trail_bend"),
     *("omega", "pressure", "speed", "camber", "friction", "tread_depth", "tread_temperature"),
+    *regressors.TWISTS,
+    *regressors.WAVES,
     *("speed_squared", "load", "slip_ratio", "slip_std", "slip_size", "utilisation"),
 )
 """Regressors and what the chain adds to them, in the order of ``values.h``."""
@@ -115,7 +117,8 @@ def _chain(part: Chain, lateral: FloatArray) -> Iterator[float]:
     needed = calibration._needed(part)
     yield from (float(len(part.gages)), *map(float, part.gages))
     yield from regressors._fitted(places, 1).ravel().tolist()
-    yield from regressors._fitted(places, 2)[2].tolist()
+    for degree in (2, 3, 4):
+        yield from regressors._fitted(places, degree)[degree].tolist()
     yield from (float(name in needed) for name in ("pressure", "camber", "speed"))
     yield from (_uses(part.force, "camber"), _uses(part.radius, "load"))
     yield from (part.mean_load, part._load_per_hardening(), max(widest or [angle_model.WIDEST]))
@@ -135,6 +138,7 @@ def _chain(part: Chain, lateral: FloatArray) -> Iterator[float]:
     yield from _sliding(part)
     yield from _cloud(part.cloud)
     yield from _likeness(part.likeness)
+    yield from _likeness(part.agreement)
 
 
 def _uses(model: Polynomial | None, name: str) -> float:
@@ -227,7 +231,7 @@ def _likeness(known: likeness.Likeness | None) -> Iterator[float]:
     yield float(names.index("angle_slope") if "angle_slope" in names else -1)
     yield known.limit
     for name in names:
-        yield from (_number(name), *likeness.DRIFT[name], float(name in regressors.ODD))
+        yield from (_number(name), *likeness.DRIFT[name], float(name in regressors.SIDED))
         yield from (*likeness.ROAD_DRIFT[name], likeness.CAMBER_DRIFT.get(name, 0.0))
     yield from known.coefficients.ravel().tolist()
     yield from known.covariance.ravel().tolist()

@@ -31,7 +31,7 @@ from tirelib.arrays import BoolArray, FloatArray
 from tirelib.estimators import tilt
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Term, Variable, design
-from tirelib.estimators.regressors import ODD
+from tirelib.estimators.regressors import SIDED, TWISTS, WAVES
 
 DRIFT = {
     "compression": (0.0170, 0.0021),
@@ -48,6 +48,7 @@ DRIFT = {
     "steepness_change": (0.0997, 0.3831),
     "lead_bend": (-0.0150, 0.0346),
     "trail_bend": (-0.0440, 0.0286),
+    **dict.fromkeys((*TWISTS, *WAVES), (0.0, 0.0)),
 }
 """Shift (SI) at the same contact angle, for a pressure that is doubled and for a squared speed that
 grows by (40 m/s)^2: of the rig's tires `reference`, `soft` and `stiff`, mean with the pressure and
@@ -68,6 +69,7 @@ ROAD_DRIFT = {
     "steepness_change": (0.0481, -0.2342),
     "lead_bend": (-0.0014, -0.0244),
     "trail_bend": (-0.0041, 0.0065),
+    **dict.fromkeys((*TWISTS, *WAVES), (0.0, 0.0)),
 }
 """Shift (SI) at the same contact angle for a tread of e times the stiffness, and for a sliding
 share that grows by one at a positive slip angle (odd regressors change their sign with it): mean of
@@ -81,6 +83,8 @@ ROAD_DOUBT = 0.5
 PRESSURE_DOUBT, SPEED_DOUBT = 0.5, 1.0
 """Tires differ: standard deviation of another tire's shift, as a share of `DRIFT`; those of the rig
 by 0.35 of the shift with pressure. ``docs/theory/estimate_numbers.md`` has half and double."""
+AGREEMENT = (*TWISTS, *WAVES)
+"""Regressors that say whether the gages agree with each other; the others say what tire it is."""
 FEWEST_UNLIKE, SHARE_UNLIKE = 5, 0.08
 """Turns, and share of them, that must look like another tire's. On drawn roads and treads up to
 0.055 of a tire's own turns do (``python build/other_tire.py --own``), all above 6.5 kN on a worn
@@ -151,7 +155,7 @@ class Likeness:
         sided = np.hypot(*(force_laws or laws).pressure_departure(values))
         speed = laws.speed_departure(values)
         with_pressure, with_speed = np.array([DRIFT[name] for name in self.names]).T
-        odd = np.array([name in ODD for name in self.names])
+        odd = np.array([name in SIDED for name in self.names])
         rest = self.rest(values) - pressure[:, None] * np.where(odd, 0.0, with_pressure)
         doubt = np.hypot(PRESSURE_DOUBT * pressure, unknown)[:, None] * with_pressure
         doubt = np.where(odd, sided[:, None] * with_pressure, doubt)

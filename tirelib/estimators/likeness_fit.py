@@ -1,18 +1,20 @@
 """Learn what turns of a tire look like, from conditions that were held out."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.estimators.basis import G1, G2, L1, L2, ONE, P1, T1, T2, Powers, V, times
 from tirelib.estimators.fit import design_for
-from tirelib.estimators.likeness import DRIFT, Likeness
-from tirelib.estimators.regressors import ODD
+from tirelib.estimators.likeness import AGREEMENT, DRIFT, Likeness
+from tirelib.estimators.regressors import ODD, SIDED
 
 FALSE_ALARM = 0.001
 """Probability with which a turn of the calibrated tire is taken for another's; at least the largest
 D^2 of a held-out condition is allowed, though."""
+TIRE = tuple(name for name in DRIFT if name not in AGREEMENT)
+"""Regressors that say what tire it is."""
 SPARE = 3
 """Conditions more than regressors without which their covariance says too little."""
 CORNERING = 0.2
@@ -29,6 +31,7 @@ def fit_likeness(
     turns: Mapping[str, FloatArray],
     unit: IntArray,
     rows: BoolArray,
+    names: Sequence[str] = TIRE,
 ) -> Likeness | None:
     """Return what the calibrated tire can show; None if there are too few conditions.
 
@@ -44,13 +47,15 @@ def fit_likeness(
         Regressors of single turns.
     unit, rows : shape (n_turns,)
         Measurement of each turn, and whether it counts.
+    names : sequence of str, optional
+        Regressors of `tirelib.estimators.likeness.DRIFT` that are looked at.
     """
     from scipy.special import fdtri  # calibrating only; scipy.stats takes a second to import
 
-    names = tuple(name for name in DRIFT if np.isfinite(values[name]).all())
+    names = tuple(name for name in names if np.isfinite(values[name]).all())
     conditions = np.unique(groups).size
     freedom = conditions - len(names)
-    if freedom < SPARE:
+    if freedom < SPARE or not names:
         return None
     even, odd = _terms(varying, _with_side(values, varying))
     variables, terms, x = design_for(values, [*even, *odd], (*ODD, "camber", "traction"))
@@ -58,7 +63,7 @@ def fit_likeness(
     held_out = np.empty((x.shape[0], len(names)))
     evens = np.arange(len(terms)) < len(even)
     for column, name in enumerate(names):
-        use = ~evens if name in ODD else evens
+        use = ~evens if name in SIDED else evens
         share[use, column], held_out[:, column] = _left_out(x[:, use], values[name], groups)
     size = held_out.std(axis=0) + np.finfo(np.float64).tiny
     between = shrunk_covariance(held_out / size)

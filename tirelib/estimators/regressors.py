@@ -31,7 +31,11 @@ SHAPE = (
     "trail_bend",
 )
 """Even regressors of the contact's shape, over its width and along it."""
-FEWEST_FOR_BOW = 3
+TWISTS = ("angle_twist", "cp1_twist", "cp2_twist", "tp_twist")
+"""Odd regressors: what a cubic over the lateral position has of a feature beyond level to bow."""
+WAVES = ("angle_wave", "cp1_wave", "cp2_wave", "tp_wave")
+"""Even ones: what a quartic has. No estimate uses either; they tell whether gages agree."""
+SIDED = (*ODD, *TWISTS)
 CONDITIONS = ("pressure", "speed", "camber")
 
 
@@ -54,11 +58,13 @@ def compute_regressors(features: Features, gages: Sequence[int]) -> dict[str, Fl
         fewer than three gages; ``fullness`` E_vertical over TP [rad], ``skew`` [rad]; ``steepness``
         mean of the peak rates at both edges over TP and ``steepness_change`` leading less trailing
         [1/rad]; ``lead_bend``, ``trail_bend`` from each edge to its compressive peak [rad].
+        ``angle_twist`` to ``tp_wave``: what is left over the width, NaN for fewer than four
+        (twists) and five gages (waves).
     """
     use = list(gages)
     y = features.lateral[use]
     places = tuple((y / np.abs(features.lateral).max()).tolist())
-    line, parabola = _fitted(places, 1), _fitted(places, 2)
+    line = _fitted(places, 1)
 
     def level_slope(values: FloatArray) -> tuple[FloatArray, FloatArray]:
         fitted = values[:, use] @ line.T
@@ -67,16 +73,29 @@ def compute_regressors(features: Features, gages: Sequence[int]) -> dict[str, Fl
     def level(values: FloatArray) -> FloatArray:
         return np.asarray(values[:, use] @ line[0], dtype=np.float64)
 
-    def bow(values: FloatArray) -> FloatArray:
-        if len(use) < FEWEST_FOR_BOW:
+    def highest(values: FloatArray, degree: int) -> FloatArray:
+        if len(use) <= degree:
             return np.full(len(features), np.nan)
-        return np.asarray(values[:, use] @ parabola[2], dtype=np.float64)
+        return np.asarray(values[:, use] @ _fitted(places, degree)[degree], dtype=np.float64)
+
+    def bow(values: FloatArray) -> FloatArray:
+        return highest(values, 2)
 
     scale = features.tp[:, use].mean(axis=1)
     angle, angle_slope = level_slope(features.contact_angle)
     cp1, cp1_slope = level_slope(features.cp1)
     cp2, cp2_slope = level_slope(features.cp2)
     _, tp_slope = level_slope(features.tp)
+    left = {
+        f"{name}_{what}": highest(values, degree) / unit
+        for what, degree in (("twist", 3), ("wave", 4))
+        for name, values, unit in (
+            ("angle", features.contact_angle, 1.0),
+            ("cp1", features.cp1, scale),
+            ("cp2", features.cp2, scale),
+            ("tp", features.tp, scale),
+        )
+    }
     return {
         "contact_angle": angle,
         "compression": 0.5 * (cp1 + cp2) / scale,
@@ -96,6 +115,7 @@ def compute_regressors(features: Features, gages: Sequence[int]) -> dict[str, Fl
         "steepness_change": level(features.rate_lead + features.rate_trail) / scale,
         "lead_bend": level(features.lead - features.cp1_angle),
         "trail_bend": level(features.cp2_angle - features.trail),
+        **left,
         "omega": features.omega,
         "pressure": features.pressure,
         "speed": features.speed,

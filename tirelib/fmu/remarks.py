@@ -40,6 +40,8 @@ TEXTS: Mapping[str, str] = {
     "strain_out_of_range": f"{{name}} {_RANGE} unit and order of the gages",
     "combination_out_of_range": "no calibrated turn was near this combination of load, slip and "
     "side force; not valid there: calibrate there",
+    "other_tire": "the gages do not show what they show of the calibrated tire; nothing is valid: "
+    "check tire, order and wiring of the gages",
 }
 """By kind, in the order of ``remarks.h``. SI, as the inputs and outputs are; short enough for a
 line of the bench's page."""
@@ -83,6 +85,8 @@ def remarks(
         rate = math.copysign(2.0 * np.pi / turn.features.period[0], turn.features.speed[0])
         low, high = sorted((rate / LARGEST_OMEGA_RATIO, rate * LARGEST_OMEGA_RATIO))
         found["omega_mismatch"] = Remark(omega, low, high)
+    if turn.flags & TurnFlag.OTHER_TIRE:
+        found["other_tire"] = Remark(math.nan, math.nan, math.nan)
     out = [quantity for quantity in QUANTITIES if f"{quantity}_out_of_range" in notes]
     if found or not out or chain is None:
         return found
