@@ -143,6 +143,7 @@ static Likeness likeness(Reader *r) {
     l.names = whole(r, 1, NAMES);
     l.angle_slope = whole(r, -1, l.names - 1);
     l.limit = number(r);
+    l.edge = number(r);
     l.name = rows(r, l.names, SHIFTS, 0);
     l.coefficient = taken(r, (size_t)(l.form.terms * l.names));
     l.covariance = taken(r, (size_t)(l.names * l.names));

@@ -25,7 +25,7 @@ typedef struct {
     double pull; /* pulled */
     double tilt_usual, tilt_force, tilt_load, tilt_power, tilt_slope, tilt_doubt;
     double tilt_least; /* tilt */
-    double road_doubt, unlike_pressure, unlike_speed, edge, slope_sliding; /* likeness */
+    double road_doubt, unlike_pressure, unlike_speed, slope_sliding; /* likeness */
     double widest, angle_step, largest_angle_std; /* chain, doubt, calibration */
     double bias, bias_middle, bias_width, least_std, short_std, short_width; /* contact_length */
 } Constants;
@@ -73,7 +73,7 @@ typedef struct {
 typedef struct {
     int there, names, angle_slope; /* angle_slope: its place among the names; -1: none */
     Form form;
-    double limit;
+    double limit, edge;
     const double *name, *coefficient, *covariance;
 } Likeness;
 enum { SHIFT_NUMBER, SHIFT_PRESSURE, SHIFT_SPEED, SHIFT_ODD, SHIFT_TREAD, SHIFT_SLIDING,

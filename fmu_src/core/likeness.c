@@ -15,9 +15,9 @@ void likeness_rest(const Likeness *l, const double *values, double *rest) {
 }
 
 /* Reference: Likeness.within */
-static int within(const Likeness *l, const Constants *k, const double *values) {
+static int within(const Likeness *l, const double *values) {
     for (int v = 0; v < l->form.variables; v++)
-        if (!(fabs(standardised(&l->form, v, values)) <= k->edge)) return 0;
+        if (!(fabs(standardised(&l->form, v, values)) <= l->edge)) return 0;
     return 1;
 }
 
@@ -67,7 +67,7 @@ double likeness_apart(const Likeness *l, const Constants *k, const Look *look) {
     for (int m = 0; m < 2; m++) add_along(s, n, look->moves[m], 0.0);
     solve(&s[0][0], NAMES, found, n);
     for (int i = 0; i < n; i++) square += rest[i] * found[i];
-    return within(l, k, look->values) ? square / n : NAN;
+    return within(l, look->values) ? square / n : NAN;
 }
 
 double slope_left(const Likeness *l, const Constants *k, const double *values, double sliding,
@@ -78,5 +78,5 @@ double slope_left(const Likeness *l, const Constants *k, const double *values, d
     if (i < 0) return NAN;
     likeness_rest(l, values, rest);
     *noise = hypot(sqrt(l->covariance[i * l->names + i]), k->slope_sliding * or_else(sliding, 1.0));
-    return within(l, k, values) ? rest[i] : NAN;
+    return within(l, values) ? rest[i] : NAN;
 }

@@ -60,7 +60,7 @@ CONSTANTS = (
     pulled.PULL,
     *(tilt.USUAL, tilt.FORCE, tilt.LOAD, tilt.POWER, tilt.SLOPE, tilt.READ_DOUBT),
     tilt.LEAST_LOAD,
-    *(likeness.ROAD_DOUBT, likeness.PRESSURE_DOUBT, likeness.SPEED_DOUBT, likeness.EDGE),
+    *(likeness.ROAD_DOUBT, likeness.PRESSURE_DOUBT, likeness.SPEED_DOUBT),
     likeness.ROAD_DRIFT["angle_slope"][1],
     *(angle_model.WIDEST, doubt.ANGLE_STEP, calibration.LARGEST_ANGLE_STD),
     *(contact_length.BIAS, contact_length.MIDDLE, contact_length.WIDTH),
@@ -229,7 +229,7 @@ def _likeness(known: likeness.Likeness | None) -> Iterator[float]:
     yield from _form(known.variables, known.terms)
     yield float(len(names))
     yield float(names.index("angle_slope") if "angle_slope" in names else -1)
-    yield known.limit
+    yield from (known.limit, known.edge)
     for name in names:
         yield from (_number(name), *likeness.DRIFT[name], float(name in regressors.SIDED))
         yield from (*likeness.ROAD_DRIFT[name], likeness.CAMBER_DRIFT.get(name, 0.0))

@@ -48,7 +48,14 @@ DRIFT = {
     "steepness_change": (0.0997, 0.3831),
     "lead_bend": (-0.0150, 0.0346),
     "trail_bend": (-0.0440, 0.0286),
-    **dict.fromkeys((*TWISTS, *WAVES), (0.0, 0.0)),
+    "angle_twist": (-0.0017, 0.0003),
+    "cp1_twist": (-0.0340, 0.0002),
+    "cp2_twist": (-0.0425, 0.0021),
+    "tp_twist": (-0.0251, 0.0004),
+    "angle_wave": (0.0035, 0.0006),
+    "cp1_wave": (-0.0043, 0.0360),
+    "cp2_wave": (0.0134, 0.0029),
+    "tp_wave": (0.0492, 0.0200),
 }
 """Shift (SI) at the same contact angle, for a pressure that is doubled and for a squared speed that
 grows by (40 m/s)^2: of the rig's tires `reference`, `soft` and `stiff`, mean with the pressure and
@@ -91,7 +98,7 @@ FEWEST_UNLIKE, SHARE_UNLIKE = 5, 0.08
 tread; on dry roads none. Half of the share takes one of six such campaigns for another tire's,
 double misses a tire of which 0.1 of the turns are flagged."""
 EDGE = 1.0 + 1e-6
-"""End of a standardised regressor's calibrated range."""
+"""End of a standardised regressor's calibrated range, in half ranges."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,9 +185,17 @@ class Likeness:
         square = np.sum(rest * found, axis=1) / len(self.names)
         return np.where(self.within(values), square, np.nan)
 
+    @property
+    def edge(self) -> float:
+        """How far from the middle of what was calibrated a turn is looked at, in half ranges.
+
+        Whether the gages agree is looked at wherever a turn can be valid.
+        """
+        return np.inf if self.names[0] in AGREEMENT else EDGE
+
     def within(self, values: Mapping[str, FloatArray]) -> BoolArray:
         """Tell which turns lie where the tire was seen, shape (n,)."""
-        near = [np.abs(v.standardise(values[v.name])) <= EDGE for v in self.variables]
+        near = [np.abs(v.standardise(values[v.name])) <= self.edge for v in self.variables]
         return np.asarray(np.all(near, axis=0), dtype=np.bool_)
 
     def slope_left(

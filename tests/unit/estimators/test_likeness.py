@@ -1,7 +1,8 @@
 """Another tire is told by its name, by its dimensions and by its strain; this one is not."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,29 @@ def test_another_day_of_the_same_tire_is_not_taken_for_another_tire(
     found = trained.calibration.estimate(day.features)
     assert flagged(found).sum() <= 1
     assert not estimate_document(day, found, trained.calibration)["other_tire"]["suspected"]
+
+
+def exchanged(features: Features, one: int, two: int) -> Features:
+    """Return what two gages show whose wires are exchanged."""
+    order = np.arange(features.lateral.size)
+    order[[one, two]] = two, one
+    rows = {field.name: getattr(features, field.name) for field in fields(features)}
+    wired = {name: x[:, order] for name, x in rows.items() if x.ndim == 2}
+    return replace(features, **wired)
+
+
+@pytest.mark.parametrize(("one", "two"), [*combinations(range(5), 2)])
+def test_exchanged_gages_give_no_valid_value_that_is_wrong(
+    trained: Trained, another_day: Campaign, one: int, two: int
+) -> None:
+    features, known = observe([another_day]).features, trained.calibration
+    right, found = known.estimate(features), known.estimate(exchanged(features, one, two))
+    wrong = np.zeros(len(features), dtype=np.bool_)
+    for quantity, goal in (("Fz", 100.0), ("alpha", np.deg2rad(0.2)), ("Fy", 150.0)):
+        apart = np.abs(found.value[quantity] - right.value[quantity])
+        wrong |= (apart > goal) & (apart > 3.0 * found.std[quantity])
+    assert right.turn_valid.any()
+    assert not (wrong & found.turn_valid & right.turn_valid).any()
 
 
 def test_an_estimate_says_where_another_tire_may_go_undetected(
