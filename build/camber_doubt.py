@@ -56,11 +56,10 @@ def per_degree(calibration: Calibration, seen: Observations) -> list[str]:
     chain = calibration.chains[-1]
     values = regressors_of(seen, np.zeros(len(seen)))
     found, _ = chain.predict(values)
-    rest = (
-        {}
-        if chain.likeness is None
-        else dict(zip(chain.likeness.names, chain.likeness.rest(values).T, strict=True))
-    )
+    rest: dict[str, FloatArray] = {}
+    for known in (chain.likeness, chain.agreement):
+        if known is not None:
+            rest |= zip(known.names, known.rest(values).T, strict=True)
     error = {
         "Fy [N]": found["Fy"].value - seen.truth["Fy"],
         "alpha [deg]": np.rad2deg(found["alpha"].value - seen.truth["slip_angle"]),

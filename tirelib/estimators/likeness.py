@@ -60,7 +60,7 @@ DRIFT = {
 """Shift (SI) at the same contact angle, for a pressure that is doubled and for a squared speed that
 grows by (40 m/s)^2: of the rig's tires `reference`, `soft` and `stiff`, mean with the pressure and
 rms with the speed, measured by ``python build/other_tire.py``. Odd regressors shift with the side,
-at 3 deg by so much."""
+at 3 deg by so much. Twists and waves are of `reference` alone."""
 ROAD_DRIFT = {
     "compression": (-0.0053, 0.0080),
     "cp2_slope": (0.0000, 0.0563),
@@ -76,15 +76,33 @@ ROAD_DRIFT = {
     "steepness_change": (0.0481, -0.2342),
     "lead_bend": (-0.0014, -0.0244),
     "trail_bend": (-0.0041, 0.0065),
-    **dict.fromkeys((*TWISTS, *WAVES), (0.0, 0.0)),
+    "angle_twist": (0.0000, -0.0044),
+    "cp1_twist": (0.0000, -0.0167),
+    "cp2_twist": (0.0000, 0.0225),
+    "tp_twist": (0.0000, -0.0036),
+    "angle_wave": (0.0015, 0.0005),
+    "cp1_wave": (-0.0075, 0.0075),
+    "cp2_wave": (-0.0041, 0.0054),
+    "tp_wave": (0.0064, 0.0262),
 }
 """Shift (SI) at the same contact angle for a tread of e times the stiffness, and for a sliding
 share that grows by one at a positive slip angle (odd regressors change their sign with it): mean of
 the rig's tires `reference` and `soft` on treads of 4 to 8 mm and frictions of 0.4 and 0.6, measured
-by ``python build/road_constants.py --measure reference`` (and ``soft``)."""
-CAMBER_DRIFT = {"cp2_slope": -0.3, "angle_slope": tilt.SLOPE, "tp_slope": -1.2}
+by ``python build/road_constants.py --measure reference`` (and ``soft``); twists and waves are of
+`reference` alone."""
+CAMBER_DRIFT = {
+    "cp2_slope": -0.3,
+    "angle_slope": tilt.SLOPE,
+    "tp_slope": -1.2,
+    "angle_twist": 0.17,
+    "cp1_twist": -0.49,
+    "cp2_twist": -0.65,
+    "tp_twist": -0.40,
+}
 """Shift (SI) at the same contact angle and lateral distortion per radian of a camber, of the rig's
-tires from 3 to 7 kN: -0.8 to 0.05, -0.47 to -0.26, -1.4 to -0.8 (``build/camber_doubt.py``)."""
+tires from 3 to 7 kN: -0.8 to 0.05, -0.47 to -0.26, -1.4 to -0.8 (``build/camber_doubt.py``). Twists
+are of the tire `reference` at 3.2 and 4.8 kN: 0.17 and 0.18, -0.47 and -0.52, -0.53 and -0.77,
+-0.28 and -0.51."""
 ROAD_DOUBT = 0.5
 """Standard deviation of another tire's shift with tread and sliding, as a share of `ROAD_DRIFT`."""
 PRESSURE_DOUBT, SPEED_DOUBT = 0.5, 1.0
