@@ -48,8 +48,8 @@ class TurnFlag(IntFlag):
     FAULT = 262144
     """The estimator met an error that it did not expect; the log names it. Live only."""
     OTHER_TIRE = 1048576
-    """The strain pattern is not that of the calibrated tire: another tire, or another state of
-    it."""
+    """The strain pattern is not that of the calibrated tire: another tire, another state of it, or
+    gages that do not agree, as in a wrong order."""
 
     ACCELERATING = 524288
     """The turn rate changes within the turn by more than its sources show: angles are uncertain."""
