@@ -47,7 +47,7 @@ REMEDIES = {
     "WEAK_EDGE": "Look at the load: at very low loads the contact has no clear edges.",
     "NO_CONTACT": "The wheel stands, or the gages are dead or frozen.",
     "FAULT": "Read the log, and report it: this is an error of the estimator.",
-    "OTHER_TIRE": "Use the calibration of the tire that is on the wheel; check pressure, tread and the "
+    "OTHER_TIRE": "Use the calibration of the tire on the wheel; check pressure, tread and the "
     "order of the gages.",
     "ACCELERATING": "Give the turn rate of the wheel (`omega`), from a speed sensor or the rig.",
 }
