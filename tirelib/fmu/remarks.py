@@ -129,7 +129,8 @@ def _given(known: Calibration, turn: TurnEstimate, notes: set[str]) -> Iterator[
 def _of_strain(chain: Chain, turn: TurnEstimate, out: Sequence[str]) -> tuple[str, Remark]:
     """Return the first number read from the strain that is out of its range, if one is."""
     values = {k: float(x[0]) for k, x in compute_regressors(turn.features, chain.gages).items()}
-    values["utilisation"] = turn.value("Fy") / turn.value("Fz")
+    load = turn.value("Fz")
+    values["utilisation"] = turn.value("Fy") / load if load else math.nan
     for guard in (guard for quantity in out for guard in chain.guards[quantity]):
         value, (low, high) = values.get(guard.name, math.nan), _ends(guard)
         if value < low or value > high:
