@@ -62,7 +62,7 @@ def main() -> None:
             say(
                 f"{family} {seed} {kind}: {said}: {verdict.kind} {sets} p {verdict.best.p:.3f}, "
                 f"against {verdict.base.against} {verdict.base.statistic:.1f} of "
-                f"{verdict.base.limit:.1f}, {time.process_time() - began:.1f} s"
+                f"{verdict.base.limit(given.false_alarm):.1f}, {time.process_time() - began:.1f} s"
             )
         say(f"{family}: {dict(counts)}")
 

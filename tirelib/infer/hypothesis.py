@@ -1,7 +1,7 @@
 """A hypothesis, that these effects and no other are missing, with its test.
 
-Its statistic is the largest standard score of anything beside it (`tirelib.infer.null`), by the
-family of plain tires that excuses most. A user's tire belongs to none of the families, and a test
+Its statistic is the largest standard score of anything beside it (`tirelib.infer.null`), each over
+what is usual of it on plain tires, by the family of plain tires that excuses most. A user's tire belongs to none of the families, and a test
 by what its own family shows would be too sure. So the p-value is calibrated on plain tires, with
 the hypothesis planted in the user's plan, each by the families other than its own. The rank of the
 user's statistic among a family's tires is a p-value; the largest over the families counts, so that
@@ -183,10 +183,14 @@ def _tested(
     plain = []
     for family in families:
         planted, noise = _drawn(fit, family, law_errors(fit, law), at.white.shape[1])
-        tires = noise + planted @ at.white  # whitened
-        others = [null for null in nulls if null.family is not family]
-        plain.append(_statistic(others, _products(at, tires)))
-    return nulls, tuple(plain)
+        turned = _products(at, noise + planted @ at.white)  # whitened
+        plain.append([null.scores_of(turned) for null in nulls if null.family is not family])
+    every = np.concatenate([scores for each in plain for scores in each], axis=1)
+    mean, std = np.maximum(every.mean(axis=1), 0.0), np.maximum(every.std(axis=1), 1.0)
+    for null in nulls:
+        null.usual = mean, std
+    standing = ((np.array(each) - mean[:, None]) / std[:, None] for each in plain)
+    return nulls, tuple(np.min(each.max(axis=1), axis=0) for each in standing)
 
 
 def _excusing(nulls: Sequence[Null]) -> Null:

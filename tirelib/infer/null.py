@@ -11,7 +11,9 @@ square of as many degrees of freedom n_j as a_j has components; the cube root ma
 different n_j comparable (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684). The largest of
 these standard scores is what stands out. An effect whose range lies on one side of zero may stand
 out on the other one: then something else is there. The model of plain tires is not exact: how large
-scores get on plain tires is measured (`tirelib.infer.hypothesis`).
+scores get on plain tires is measured (`tirelib.infer.hypothesis`), for each j by itself, and every
+score is held against its own distribution (Westfall and Young, Resampling-Based Multiple Testing,
+1993). Otherwise the groups of shapes that plain tires show most would set the limit for all.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -92,6 +94,8 @@ class Null:
         Of everything that may be there in addition to the hypothesis.
     counts : shape (n_names,)
         Components n_j of each.
+    usual : (shape (n_names,), shape (n_names,))
+        Mean and standard deviation of each score on plain tires, where they are more than 0 and 1.
     """
 
     def __init__(
@@ -108,6 +112,7 @@ class Null:
         self.names = [name for name in blocks if name != BASE]
         self.blocks = [blocks[name] for name in self.names]
         self.counts = np.array([block.stop - block.start for block in self.blocks], dtype=float)
+        self.usual = np.zeros(len(self.names)), np.ones(len(self.names))
         self._weighed = []
         for size in _sizes(family.largest, shown):
             variance = {name: size.of(name) ** 2 * each for name, each in shown.items()}
@@ -197,6 +202,7 @@ class Null:
     def about(self, view: View, size: "Size | None" = None) -> "Null":
         """Return the same test of other normal equations, at one size of what the tire shows."""
         other = Null(view, self.family, self.shown, self.allowed, self.sides)
+        other.usual = self.usual
         if size is not None:
             other._weighed = [each for each in other._weighed if each[0] == size]
         return other
@@ -216,7 +222,9 @@ class Null:
     def standard(self, ratios: FloatArray) -> FloatArray:
         """Return the standard scores of signed L_j / n_j, (n_names, k)."""
         scores = standard(np.abs(ratios), self.counts[:, None])
-        return np.where((ratios < 0.0) & (scores > 0.0), OPPOSITE * scores, scores)
+        scores = np.where((ratios < 0.0) & (scores > 0.0), OPPOSITE * scores, scores)
+        mean, std = self.usual
+        return np.asarray((scores - mean[:, None]) / std[:, None])
 
     @property
     def scores(self) -> FloatArray:
@@ -283,7 +291,9 @@ class Null:
         _, covariance = self.beside(name)
         count = self.counts[j]
         spread = 2.0 / (9.0 * count)
-        least = max(limit * np.sqrt(spread) + 1.0 - spread, 0.0) ** 3 * count
+        mean, std = self.usual
+        least = limit * std[j] + mean[j]
+        least = max(least * np.sqrt(spread) + 1.0 - spread, 0.0) ** 3 * count
         size = strength**2 / float(np.mean(np.diag(covariance)))
         return float(stats.ncx2.sf(least, count, size))
 

@@ -172,13 +172,14 @@ class Hypotheses:
     def simpler(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """Return the likeliest hypothesis of fewer of its effects that is at least as likely.
 
-        Where there is one, a law of its is not right: that more effects cover what it leaves does
-        not show that they are there.
+        Where there is one that stays with loose laws, a law of its is not right: that more effects
+        cover what it leaves does not show that they are there.
         """
         fewer = (
             h
             for h in self.tried
             if h.plausible
+            and np.isfinite(h.looseness)
             and set(h.names) < set(hypothesis.names)
             and h.likelihood >= hypothesis.likelihood
         )
