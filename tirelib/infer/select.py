@@ -6,10 +6,10 @@ off than laws are. Its p-value is the rank of the largest standard score (`tirel
 among plain tires with the hypothesis planted in the user's plan: for each family of tires by
 itself; the largest p over the families counts, so that a tire that is like any one of them is
 covered. A hypothesis is rejected as well where a rival of as many effects explains the runs much
-better (`tirelib.infer.rival`). Every hypothesis with p > alpha is in the set. Its smallest members
-are what the data say (Ferrari and Yang 2015): none in it, nothing is missing; one smallest member,
-that is what is missing; several, they cannot be told apart; none at all, something unknown is
-there.
+better (`tirelib.infer.rival`), whether the rival itself is rejected or not. Every hypothesis with
+p > alpha is in the set. Its smallest members are what the data say (Ferrari and Yang 2015): none in
+it, nothing is missing; one smallest member, that is what is missing; several, they cannot be told
+apart; none at all, something unknown is there.
 """
 
 import os
@@ -318,9 +318,8 @@ def select(
         every = sorted(
             (h for h in dict.fromkeys(level) if h is not None), key=lambda h: -h.likelihood
         )
-        # a rival out of its range is not there, but something that looks like it may be
-        rivals = [h for h in every if np.isfinite(h.looseness)]
-        fitted = [hypotheses.against(h, rivals[0]) if rivals else h for h in every if h.plausible]
+        # a rival that is rejected or out of its range is not there, but something like it may be
+        fitted = [hypotheses.against(h, every[0]) for h in every if h.plausible]
         staying = [h for h in fitted if h.p > alpha]
         simpler = {h: hypotheses.simpler(h) for h in staying}
         members = [h for h in staying if simpler[h] is None]
