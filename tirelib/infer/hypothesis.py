@@ -1,12 +1,12 @@
 """A hypothesis, that these effects and no other are missing, with its test.
 
 Its statistic is the largest standard score of anything beside it (`tirelib.infer.null`), each over
-what is usual of it on plain tires, by the family of plain tires that excuses most. A user's tire belongs to none of the families, and a test
-by what its own family shows would be too sure. So the p-value is calibrated on plain tires, with
-the hypothesis planted in the user's plan, each by the families other than its own. The rank of the
-user's statistic among a family's tires is a p-value; the largest over the families counts, so that
-a tire which differs from the known families no more than any of them does from the others is
-covered.
+what is usual of it on plain tires, by the family of plain tires that excuses most. A user's tire
+belongs to none of the families, and a test by what its own family shows would be too sure. So the
+p-value is calibrated on plain tires, with the hypothesis planted in the user's plan, each by the
+families other than its own. The rank of the user's statistic among a family's tires is a p-value;
+the largest over the families counts, so that a tire which differs from the known families no more
+than any of them does from the others is covered.
 """
 
 from collections.abc import Mapping, Sequence
