@@ -82,10 +82,15 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
     views = [fit.view(problem, width) for width in OWN]
     found = []
     for law in GRID:
-        allowed = {BASE: fit.widths**2, **law_errors(fit, law)}
         found.append(
             max(
-                Null(view, family, family.spread(fit.sizes), allowed, fit.sides).likelihood
+                Null(
+                    view,
+                    family,
+                    family.spread(fit.sizes),
+                    {BASE: fit.widths**2, **law_errors(fit, law, view)},
+                    fit.sides,
+                ).likelihood
                 for family in others
                 for view in views
             )

@@ -24,6 +24,8 @@ LAWS = (0.03, 0.1, 0.3)
 """Relative standard deviations by which laws are off: a hypothesis stays if it does with any."""
 USUAL = 0.15
 """That of most laws."""
+ALIKE = 0.25
+"""How much of a law's error looks like any one other effect, as a share of the whole."""
 LOOSEST = 1.0
 """That which is tried where a hypothesis is rejected: its laws are off by as much as themselves."""
 SLACK = 2.0
@@ -156,7 +158,7 @@ def judged(
 def _null(view: View, fit: Posterior, family: Family, law: float) -> Null:
     wide = fit.widths**2
     wide[len(fit.point.base) :] *= PRIOR**2
-    allowed = {BASE: wide, **law_errors(fit, law)}
+    allowed = {BASE: wide, **law_errors(fit, law, view)}
     return Null(view, family, family.spread(fit.sizes), allowed, fit.sides)
 
 
@@ -182,7 +184,7 @@ def _tested(
     nulls = tuple(_null(at, fit, family, law) for family in families)
     plain = []
     for family in families:
-        planted, noise = _drawn(fit, family, law_errors(fit, law), at.white.shape[1])
+        planted, noise = _drawn(fit, family, law_errors(fit, law, at), at.white.shape[1])
         turned = _products(at, noise + planted @ at.white)  # whitened
         plain.append([null.scores_of(turned) for null in nulls if null.family is not family])
     every = np.concatenate([scores for each in plain for scores in each], axis=1)
@@ -247,7 +249,7 @@ def _drawn(
     for name, variance in laws.items():
         block = blocks[name]
         size = (len(family), block.stop - block.start)
-        planted[:, block] = np.sqrt(variance) * random.standard_normal(size)
+        planted[:, block] += np.sqrt(variance) * random.standard_normal(size)
     return planted, random.standard_normal((len(family), count))
 
 
@@ -260,9 +262,37 @@ def _products(view: View, white: FloatArray) -> Products:
     return view.white @ white.T, np.sum(white**2, axis=1)
 
 
-def law_errors(fit: Posterior, law: float) -> dict[str, float | FloatArray]:
-    """Return variances of the blocks of laws that are off by a relative standard deviation."""
-    return {ROUGHLY + effect.name: law**2 for effect in fit.effects if not effect.exact}
+def law_errors(fit: Posterior, law: float, view: View) -> dict[str, float | FloatArray]:
+    """Return variances by block where laws are off by a relative standard deviation.
+
+    They come on top of what plain tires show. A law's error has shapes of its own, and looks to
+    some extent like each other effect: by `ALIKE` of its size in what the base cannot take.
+    """
+    out: dict[str, float | FloatArray] = {
+        ROUGHLY + effect.name: law**2 for effect in fit.effects if not effect.exact
+    }
+    if out:
+        square, others = _beyond_base(fit, view)
+        out |= {name: (ALIKE * law) ** 2 * square / each for name, each in others.items()}
+    return out
+
+
+def _beyond_base(fit: Posterior, view: View) -> tuple[float, dict[str, float]]:
+    """Return the square of what the laws do that the base cannot take, and of other effects' rows.
+
+    The rows are of a strength of one range; an effect of which the base takes all is left out.
+    """
+    gram, first = view.normal.gram, len(fit.point.base)
+    base = gram[:first, :first] + np.diag(fit.widths[:first] ** -2)
+    left = gram - gram[:, :first] @ np.linalg.solve(base, gram[:first])
+    each = zip(fit.effects, fit.point.ranges, strict=False)
+    ranges = np.concatenate([np.where(effect.exact, 0.0, size) for effect, size in each])
+    here = slice(first, first + len(ranges))
+    others = {
+        effect.name: float(np.mean(np.diag(left)[view.normal.blocks[effect.name]]))
+        for effect in fit.point.effects[fit.count :]
+    }
+    return float(ranges @ left[here, here] @ ranges), {k: v for k, v in others.items() if v > 0.0}
 
 
 def plausible(fit: Posterior, own_effects: int) -> bool:

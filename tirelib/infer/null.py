@@ -84,7 +84,7 @@ class Null:
     shown : mapping of block to variance
         What its tires show in the plan (`Family.spread`).
     allowed : mapping of block to variance
-        What the hypothesis leaves open beside that.
+        What the hypothesis leaves open in addition to that.
     sides : mapping of block to sign
         Effects of one number whose range lies on this side of zero.
 
@@ -116,7 +116,7 @@ class Null:
         self._weighed = []
         for size in _sizes(family.largest, shown):
             variance = {name: size.of(name) ** 2 * each for name, each in shown.items()}
-            spread = view.normal.spread({**variance, **allowed})
+            spread = view.normal.spread(variance) + view.normal.spread(allowed)
             means = {name: size.of(name) * each for name, each in family.means.items()}
             self._weighed.append((size, Weighed(view.normal.about(means), spread)))
 

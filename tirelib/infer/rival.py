@@ -27,7 +27,8 @@ def p_against(problem: Problem, hypothesis: Hypothesis, rival: Hypothesis) -> fl
     ratio = max(rival.likelihood - hypothesis.likelihood, 0.0)
     fit = hypothesis.fit
     modelled = fit.rest - np.tensordot(_coordinates(fit), fit.rows[BASE], axes=1)
-    laws, own = law_errors(fit, hypothesis.law), hypothesis.null.view.own
+    view = hypothesis.null.view
+    laws, own = law_errors(fit, hypothesis.law, view), view.own
     p = [float(np.exp(-ratio))]
     for family in (null.family for null in hypothesis.nulls):
         # what is measured where the hypothesis is true, less what is measured

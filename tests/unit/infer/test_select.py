@@ -10,7 +10,8 @@ import pytest
 from tests.unit.infer.linear_problem import SHAPES, N, Solved, Toy, drawn, family
 from tirelib.arrays import FloatArray
 from tirelib.errors import ParameterError
-from tirelib.infer.hypothesis import Hypothesis, judged
+from tirelib.infer import hypothesis
+from tirelib.infer.hypothesis import ALIKE, Hypothesis, judged
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Point
 from tirelib.infer.select import Hypotheses, _apart, _further, select
@@ -138,6 +139,19 @@ class Rough(Toy):
         self, point: Point, solved: Any, slopes: FloatArray, count: int
     ) -> list[FloatArray]:
         return [np.linalg.norm(size) * self.ways for size in point.ranges[:count]]
+
+
+@pytest.mark.parametrize(("share", "named"), [(0.0, {"bend", "twist"}), (ALIKE, {"bend"})])
+def test_a_small_part_of_a_strong_effect_that_looks_like_another_gets_no_name(
+    monkeypatch: pytest.MonkeyPatch, share: float, named: set[str]
+) -> None:
+    """Its law is only roughly right: a twentieth of what it does may be of another shape."""
+    toy = Toy(drawn(np.random.default_rng(2)))
+    toy.by["bend"] = 10.0 * toy.by["bend"]
+    toy.measured = toy.measured + toy.by["bend"][0] + 0.05 * 10.0 * toy.by["twist"][0]
+    monkeypatch.setattr(hypothesis, "ALIKE", share)
+    found = select(toy, FAMILIES)
+    assert {frozenset(names) for names in found.sets} == {frozenset(named)}
 
 
 def test_a_law_that_is_a_definition_has_no_error() -> None:
