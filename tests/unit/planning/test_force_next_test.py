@@ -65,8 +65,9 @@ def test_pressure_that_was_visited_in_order_is_never_taken_for_wear() -> None:
 
 
 def test_what_serves_as_well_is_indistinguishable_and_the_test_is_told() -> None:
-    # a drift so small that these runs do not tell it from the pressure: a larger one is named
-    found = assess_forces(case("wear", 0.05, seed=2), BRUSH)
+    # a drift so small that nothing is missing at 5 %: at 10 % something is, and these runs do not
+    # tell it from the pressure; a larger one is named
+    found = assess_forces(case("wear", 0.05, seed=2), BRUSH, false_alarm=0.1)
     assert assess_forces(case("wear", 0.08, seed=2), BRUSH).named == ("friction_drift",)
     assert found.verdict == "indistinguishable"
     assert set(PAIR) <= set(found.named)
