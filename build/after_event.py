@@ -15,6 +15,7 @@ import numpy as np
 from tirelib.arrays import FloatArray
 from tirelib.signal import angle
 from tirelib.signal.turns import LARGEST_ANGLE_STD
+from tirelib.threads import one_thread
 
 TURN, TURNS, BEGINS = 1000, 16, 6.0
 """Samples of an even turn; turns; where the earliest bump begins."""
@@ -64,4 +65,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with one_thread():
+        main()
