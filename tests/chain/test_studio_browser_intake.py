@@ -348,7 +348,9 @@ def test_after_ones_own_cancel_nothing_is_advised_against_a_failure(
         page = page_at(browser, f"http://{served.host}/?token={TOKEN}")
         page.evaluate(f"location.hash = '#/suspect/{name}'")
         wait_for(page, RUNS)
-        page.get_by_role("button", name="Cancel").click()
+        cancel = page.get_by_role("button", name="Cancel")
+        until(lambda: cancel.count() == 1)  # what ran beside the held diagnosis has ended
+        cancel.click()
         page.get_by_role("heading", name="It was cancelled").wait_for()
         said = page.locator("#ways").inner_text()
         page.context.close()
