@@ -138,7 +138,7 @@ def bus_options(texts: Sequence[str]) -> dict[str, Any]:
     Raises
     ------
     DeviceError
-        With every text that has no ``=``.
+        If a text has no ``=``; the message names every such text.
 
     Examples
     --------

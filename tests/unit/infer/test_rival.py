@@ -1,12 +1,15 @@
 """A rival that explains the runs much better puts a hypothesis out of the set."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from tests.unit.infer.linear_problem import EFFECTS, N, Toy, by_effect, drawn, family
 from tirelib.arrays import FloatArray
-from tirelib.infer.hypothesis import LAWS
+from tirelib.infer.hypothesis import LAWS, Hypothesis
+from tirelib.infer.posterior import Posterior
 from tirelib.infer.problem import Point
 from tirelib.infer.rival import p_against
 from tirelib.infer.select import Hypotheses, select
@@ -79,3 +82,19 @@ def test_a_rival_that_gains_nothing_puts_nothing_out() -> None:
     assert one is not None
     assert other is not None
     assert p_against(toy, one, other) > 0.2
+
+
+def test_a_rival_counts_even_where_it_is_itself_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
+    tested = Hypotheses._tested
+
+    def rejected(self: Hypotheses, problem: Any, fit: Posterior) -> Hypothesis:
+        """Return a hypothesis of the exact law as one that is rejected with all laws."""
+        h = tested(self, problem, fit)
+        return replace(h, p_rival=0.0, looseness=np.inf) if h.names == ("bend",) else h
+
+    monkeypatch.setattr(Hypotheses, "_tested", rejected)
+    found = select(planted("bend", 3), FAMILIES)
+    assert ("twist",) not in found.sets
+    covered = found.hypotheses.at(["twist"])
+    assert covered is not None
+    assert covered.rival == "bend"

@@ -11,7 +11,7 @@ from tests.unit.infer.linear_problem import SHAPES, N, Solved, Toy, drawn, famil
 from tirelib.arrays import FloatArray
 from tirelib.errors import ParameterError
 from tirelib.infer import hypothesis
-from tirelib.infer.hypothesis import ALIKE, Hypothesis, judged
+from tirelib.infer.hypothesis import LOOKALIKE_SHARE, Hypothesis, judged
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Point
 from tirelib.infer.select import Hypotheses, _apart, _further, select
@@ -141,7 +141,9 @@ class Rough(Toy):
         return [np.linalg.norm(size) * self.ways for size in point.ranges[:count]]
 
 
-@pytest.mark.parametrize(("share", "named"), [(0.0, {"bend", "twist"}), (ALIKE, {"bend"})])
+@pytest.mark.parametrize(
+    ("share", "named"), [(0.0, {"bend", "twist"}), (LOOKALIKE_SHARE, {"bend"})]
+)
 def test_a_small_part_of_a_strong_effect_that_looks_like_another_gets_no_name(
     monkeypatch: pytest.MonkeyPatch, share: float, named: set[str]
 ) -> None:
@@ -149,7 +151,7 @@ def test_a_small_part_of_a_strong_effect_that_looks_like_another_gets_no_name(
     toy = Toy(drawn(np.random.default_rng(2)))
     toy.by["bend"] = 10.0 * toy.by["bend"]
     toy.measured = toy.measured + toy.by["bend"][0] + 0.05 * 10.0 * toy.by["twist"][0]
-    monkeypatch.setattr(hypothesis, "ALIKE", share)
+    monkeypatch.setattr(hypothesis, "LOOKALIKE_SHARE", share)
     found = select(toy, FAMILIES)
     assert {frozenset(names) for names in found.sets} == {frozenset(named)}
 
