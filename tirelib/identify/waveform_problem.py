@@ -74,6 +74,7 @@ class WaveformProblem:
     """
 
     living: Sequence[Effect] = ()
+    lookalike: float = 0.0
 
     def __init__(
         self,

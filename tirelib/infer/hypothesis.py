@@ -24,9 +24,6 @@ LAWS = (0.03, 0.1, 0.3)
 """Relative standard deviations by which laws are off: a hypothesis stays if it does with any."""
 USUAL = 0.15
 """That of most laws."""
-LOOKALIKE_SHARE = 0.25
-"""How much of a law's error looks like any one other effect, as a share of the whole. Half and
-double of it: docs/theory/verdict_numbers.md."""
 LOOSEST = 1.0
 """That which is tried where a hypothesis is rejected: its laws are off by as much as themselves."""
 SLACK = 2.0
@@ -267,15 +264,15 @@ def law_errors(fit: Posterior, law: float, view: View) -> dict[str, float | Floa
     """Return variances by block where laws are off by a relative standard deviation.
 
     They come on top of what plain tires show. A law's error has shapes of its own, and looks to
-    some extent like each other effect: by `LOOKALIKE_SHARE` of its size in what the base cannot
-    take.
+    some extent like each other effect: by the problem's share of its size (`Model.lookalike`) in
+    what the base cannot take.
     """
     out: dict[str, float | FloatArray] = {
         ROUGHLY + effect.name: law**2 for effect in fit.effects if not effect.exact
     }
-    if out:
+    if out and fit.lookalike:
         square, others = _beyond_base(fit, view)
-        out |= {name: (LOOKALIKE_SHARE * law) ** 2 * square / each for name, each in others.items()}
+        out |= {name: (fit.lookalike * law) ** 2 * square / each for name, each in others.items()}
     return out
 
 

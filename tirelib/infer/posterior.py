@@ -77,6 +77,8 @@ class Posterior:
         J at the point.
     far : bool
         Whether the model leaves more than `FAR` of what noise leaves.
+    lookalike : float
+        The problem's share of a law's error that looks like any one other effect.
     """
 
     point: Point
@@ -88,6 +90,7 @@ class Posterior:
     covariance: FloatArray
     cost: float
     far: bool
+    lookalike: float
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -268,6 +271,7 @@ def posterior(
         covariance,
         cost,
         bool(cost > FAR * rest.size),
+        problem.lookalike,
     )
 
 

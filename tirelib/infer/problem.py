@@ -112,6 +112,13 @@ class Model(Protocol):
         slopes are by all coordinates, as `slopes` gives them.
         """
 
+    @property
+    def lookalike(self) -> float:
+        """How much of a law's error looks like any one other effect beyond these rows, as a share.
+
+        Zero where the rows of `roughly` hold all that an error may look like.
+        """
+
 
 class Problem(Model, Protocol):
     """A model whose hypotheses are tested: with a whitening, and what the plan can show."""

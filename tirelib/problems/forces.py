@@ -122,6 +122,7 @@ class ForceProblem:
         self.noise = np.full(load.size, noise)
         self.present = load.size  # points that are measured: the first ones
         self.dead: dict[str, str] = {}
+        self.lookalike = 0.0  # `roughly` has every pair of conditions
         self._whiteners: dict[float, PointWhitener] = {}
         solved = self.solve(self.start)
         self.slip = slip_of(solved.state, quantity)

@@ -24,7 +24,14 @@ from tirelib.model.chain import Changes
 from tirelib.model.slopes import SolutionSlopes, added_by_values, by_effects, by_values
 from tirelib.model.solution import Solution
 from tirelib.model.state import Operating, State
-from tirelib.problems.strain_laws import SHAPES, as_large, beside, law_errors, stiffened
+from tirelib.problems.strain_laws import (
+    LOOKALIKE_SHARE,
+    SHAPES,
+    as_large,
+    beside,
+    law_errors,
+    stiffened,
+)
 from tirelib.problems.strain_living import in_base, living
 from tirelib.problems.whiten_strain import INSIDE, Whitener
 from tirelib.rolling.assemble import Unknowns
@@ -203,6 +210,7 @@ class StrainProblem:
 
         further = [effect for effect in catalogue if effect.name not in has]
         self.living, self.dead = living(further, self.data.points, signal)
+        self.lookalike = LOOKALIKE_SHARE
 
     @property
     def starts(self) -> tuple[Point, Point]:

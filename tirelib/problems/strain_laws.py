@@ -32,6 +32,10 @@ otherwise with conditions, has another shape, one that goes with speed, is at an
 sharper. Root mean squares over twelve campaigns of the rig with a hidden effect are .35, .2, .07
 and .03, over four of the continuum .18, .25, .09 and .03."""
 
+LOOKALIKE_SHARE = 0.25
+"""How much of a law's error looks like any one other effect beyond these parts, as a share of the
+whole. Half and double of it: docs/theory/verdict_numbers.md."""
+
 
 def law_errors(
     rows: FloatArray, half_angle: FloatArray, points: Operating, present: int
