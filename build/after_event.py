@@ -12,10 +12,10 @@ from unittest import mock
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.threads import one_thread
 from tirelib.signal import angle
 from tirelib.signal.turns import LARGEST_ANGLE_STD
-from tirelib.threads import one_thread
 
 TURN, TURNS, BEGINS = 1000, 16, 6.0
 """Samples of an even turn; turns; where the earliest bump begins."""

@@ -30,7 +30,7 @@ from demo import (
 from rich.console import Console
 from rich.rule import Rule
 
-from tirelib.threads import one_thread
+from tirelib.core.threads import one_thread
 
 if TYPE_CHECKING:
     from pages.live import LiveFiles

@@ -28,7 +28,7 @@ from demo import PROGRAMS, ROOT, Steps
 from rich.console import Console
 
 from tirebench.recording.recording import Recording
-from tirelib.threads import one_thread
+from tirelib.core.threads import one_thread
 
 OUT = ROOT / "build/out/bench-endurance"
 LINES = {"serial, 1 wheel": ("serial", 1), "slcan FD, 4 wheels": ("RAW16", 4)}

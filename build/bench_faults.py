@@ -30,7 +30,7 @@ from rich.console import Console
 from rich.table import Table
 
 from tirebench.protocols.layouts import RAW12C, RAW16
-from tirelib.threads import one_thread
+from tirelib.core.threads import one_thread
 
 OUT = Path(__file__).resolve().parent / "out" / "bench_faults.json"
 MOST_LOST, MOST_LOST_SHORT = 1.1, 1.5

@@ -31,7 +31,7 @@ from tirebench.protocols.plan import ProtocolPlan
 from tirebench.recording.header import RecordingHeader
 from tirebench.setup.source_plan import SourcePlan
 from tirebench.wire.conditions import Conditions
-from tirelib.threads import one_thread
+from tirelib.core.threads import one_thread
 
 FIFO = 16 * 1024
 

@@ -32,7 +32,7 @@ from tirebench.recording.recorder import Recorder
 from tirebench.wire.conditions import Conditions
 from tirebench.wire.device import Device
 from tirelib.campaign import read_campaign
-from tirelib.threads import one_thread
+from tirelib.core.threads import one_thread
 
 READ, CHUNK = 0.004, 0.25
 """What a read brings and what a chunk holds, [s]."""

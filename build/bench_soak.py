@@ -41,7 +41,7 @@ from tirebench.wire.conditions import Conditions
 from tirebench.wire.device import Device
 from tirebench.wire.frames import SAMPLES, TICK, encode, strain_frames
 from tirelib.campaign import Run, read_campaign
-from tirelib.threads import one_thread
+from tirelib.core.threads import one_thread
 
 OUT = ROOT / "build/out/bench-soak"
 RATES = {"flips": 2e-4, "lost": 2e-4, "dup": 2e-4}

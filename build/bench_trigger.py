@@ -27,7 +27,7 @@ from tirebench.recording.header import RecordingHeader
 from tirebench.recording.recorder import alarm_event
 from tirebench.wire.conditions import Conditions
 from tirebench.wire.frames import encode, strain_frames
-from tirelib.threads import one_thread
+from tirelib.core.threads import one_thread
 
 WHEELS, FRAMES, PERIOD_US, SAMPLES = 4, 5, 1600, 16
 READ = 1e-6 * FRAMES * PERIOD_US

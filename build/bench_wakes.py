@@ -31,9 +31,9 @@ from tirebench.live.exchange import FINISH, Address, Exchange, woken
 from tirebench.live.supervised import CONTEXT, orphaned, settled
 from tirebench.wire.conditions import Conditions
 from tirebench.wire.timeline import Samples
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.threads import one_thread
 from tirelib.fmu.build import build_fmu
-from tirelib.threads import one_thread
 
 RATE, SAMPLES, NAP = 1e4, 16, 0.01
 WAITS, TAKES, UNPICKLES, PREPARES, STEPS = range(5)

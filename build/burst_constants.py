@@ -15,11 +15,11 @@ import numpy as np
 from ramp_error import RATE, play
 from road_constants import times
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.threads import one_thread
 from tirelib.signal import contacts
 from tirelib.signal.contacts import Contact, ContactFinder
 from tirelib.signal.turns import LONGEST_TURN
-from tirelib.threads import one_thread
 
 CENTRE, TRIALS, NEAR = 2, 60, 20
 NUMBERS = (

@@ -18,19 +18,19 @@ from cosim.vehicle import Controls, Vehicle
 from road_constants import times
 from road_coverage import measured, rows_of, tire_of
 
-from tirelib.arrays import FloatArray
-from tirelib.core import choose_numpy
+from tirelib.core.arrays import FloatArray
+from tirelib.core.compiled import choose_numpy
+from tirelib.core.flags import TurnFlag
+from tirelib.core.threads import one_thread
 from tirelib.estimators import tilt
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.likeness import CAMBER_DRIFT
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.train import train
-from tirelib.flags import TurnFlag
 from tirelib.observations import Observations
 from tirelib.rig.plans import Plan, plan
 from tirelib.rig.tire import TIRES, Condition
-from tirelib.threads import one_thread
 
 LOADS = (1700.0, 3200.0, 4800.0, 7000.0)
 CAMBERS = (-3.0, -1.5, -0.75, 0.0, 0.75, 1.5, 3.0)

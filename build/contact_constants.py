@@ -15,11 +15,11 @@ import click
 from tirelib.contact import checks, exact
 from tirelib.contact import exact_energy as energy
 from tirelib.contact.tread import Tread
-from tirelib.errors import ConvergenceError, TirelibError
-from tirelib.parameters import read_tire
+from tirelib.core.errors import ConvergenceError, TirelibError
+from tirelib.core.parameters import read_tire
+from tirelib.core.threads import one_thread
 from tirelib.report.simulation import simulate
 from tirelib.ring.ring import Ring
-from tirelib.threads import one_thread
 
 BICYCLE = {
     "ring_radius": 0.330,

@@ -16,11 +16,11 @@ from continuum.observe import trace
 from continuum.solve import model, solve
 from continuum.tire import Condition, Tire
 
+from tirelib.core.threads import one_thread
 from tirelib.rig.observe import trace as rig_trace
 from tirelib.rig.solve import solve as rig_solve
 from tirelib.rig.tire import Condition as RigCondition
 from tirelib.rig.tire import RigTire
-from tirelib.threads import one_thread
 
 ROOT = Path(__file__).resolve().parents[1]
 LOADS = (2500.0, 4500.0, 6500.0)

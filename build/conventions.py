@@ -1,7 +1,7 @@
 """Drawings of the sign conventions: ``python build/conventions.py`` writes docs/reference/signs.
 
-The signs themselves come from `tirelib.axes`; the drawings show one and the same situation in each
-axis system.
+The signs themselves come from `tirelib.core.axes`; the drawings show one and the same situation in
+each axis system.
 """
 
 from pathlib import Path
@@ -14,8 +14,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, FancyBboxPatch
 
-from tirelib.axes import FLIPPED, sign
-from tirelib.threads import one_thread
+from tirelib.core.axes import FLIPPED, sign
+from tirelib.core.threads import one_thread
 
 OUT = Path(__file__).resolve().parent.parent / "docs/reference/signs"
 NAMES = {

@@ -38,7 +38,7 @@ from demo_live import (
 )
 from pages.gallery import into_gallery
 
-from tirelib.threads import one_thread
+from tirelib.core.threads import one_thread
 
 if TYPE_CHECKING:
     from pages.live import LiveFiles

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from tirelib.campaign import conditions_of, read_campaign
+from tirelib.core.threads import one_thread
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.features import RecordReader, concatenate_features
 from tirelib.features.extract import reference_features
 from tirelib.signal import LowPass, TurnCutter, stack_turns
-from tirelib.threads import one_thread
 
 
 def timed(work: Callable[[], Any]) -> tuple[float, Any]:

@@ -19,8 +19,9 @@ import numpy as np
 import pandas as pd
 from ramp_coverage import RAMPS, STEADY, TRUE, campaigns
 
-from tirelib.arrays import FloatArray
-from tirelib.core import choose_numpy
+from tirelib.core.arrays import FloatArray
+from tirelib.core.compiled import choose_numpy
+from tirelib.core.threads import one_thread
 from tirelib.estimators import ends, fit_links, fit_sliding, pulled
 from tirelib.estimators.calibrate import calibrate_chain
 from tirelib.estimators.edge import EDGE_UNIT
@@ -28,7 +29,6 @@ from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.unknowns import TWO_SIGMA
 from tirelib.observations import Observations, observe
 from tirelib.rig.campaign import TRUTH_FILE
-from tirelib.threads import one_thread
 
 CONSTANTS: tuple[tuple[ModuleType, str], ...] = (
     (fit_links, "FREE_ROLLING"),

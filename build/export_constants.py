@@ -18,9 +18,9 @@ from tirelib.brush.mf import magic_forces
 from tirelib.brush.mf_fit import MagicPoints, fit_magic
 from tirelib.compare import magic_points
 from tirelib.compare.force_model import ForceModel, force_model_of
-from tirelib.errors import CalibrationError
-from tirelib.parameters import Number, TireFile
-from tirelib.threads import one_thread
+from tirelib.core.errors import CalibrationError
+from tirelib.core.parameters import Number, TireFile
+from tirelib.core.threads import one_thread
 
 TIRES = 8
 RANGE = {"slip_angle": 0.2, "slip_ratio": 0.15, "speed": 16.0, "radius": 0.32}

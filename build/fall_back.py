@@ -18,14 +18,14 @@ import click
 import numpy as np
 from ramp_coverage import STEADY, campaigns
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.threads import one_thread
 from tirelib.estimators import basis
 from tirelib.estimators.calibrate import calibrate_chain
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.train import take
 from tirelib.observations import Observations, observe
 from tirelib.rig.plans import plan
-from tirelib.threads import one_thread
 
 STEP = 250.0
 """Least distance of two loads of a plan, [N]."""

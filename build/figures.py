@@ -16,10 +16,10 @@ from rich.console import Console
 from ring_figures import cases, contact, lateral, speed, static
 from ring_figures import loads as over_load
 
-from tirelib.parameters import Tire, read_tire
+from tirelib.core.parameters import Tire, read_tire
+from tirelib.core.threads import one_thread
 from tirelib.report.page import Drawing, Section, draw_all, write_page
 from tirelib.report.simulation import Simulation
-from tirelib.threads import one_thread
 
 ROOT = Path(__file__).resolve().parent.parent
 ROLLING, TEST, LITERATURE_A, LITERATURE_B = "table-6-1", "table-6-2-195-65r15", "gong", "jenkins"

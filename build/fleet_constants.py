@@ -9,8 +9,8 @@ are; and how far joined numbers move when the grid of the scatter ends elsewhere
 import click
 import numpy as np
 
+from tirelib.core.threads import one_thread
 from tirelib.fleet import siblings, spread
-from tirelib.threads import one_thread
 
 DRAWS = 200
 TIRES = 12

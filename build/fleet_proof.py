@@ -35,6 +35,7 @@ from tests.fleet.recordings import describe, write_drive
 from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import read_campaign
 from tirelib.cli.fleet import run_verb
+from tirelib.core.threads import one_thread
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.train import train
 from tirelib.fleet import engine, work
@@ -42,7 +43,6 @@ from tirelib.fleet.cluster import cluster
 from tirelib.fleet.dataset import DataSet
 from tirelib.fleet.sources import Source, find_sources
 from tirelib.observations import observe
-from tirelib.threads import one_thread
 
 ROOT = Path(__file__).parents[1]
 SAY = Console(highlight=False, soft_wrap=True).print

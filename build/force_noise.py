@@ -15,10 +15,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tests.magic_sweep import Sweep, magic_sweep
 from tirelib.campaign import read_campaign
+from tirelib.core.threads import one_thread
 from tirelib.identify import force_noise
 from tirelib.identify.force_data import FORCES, force_data
 from tirelib.identify.force_points import ForcePoints, force_points
-from tirelib.threads import one_thread
 
 CONSTANTS = ("FEWEST_NEIGHBOURS", "MOST_NEIGHBOURS", "NEIGHBOUR_REACH", "STEEPEST")
 

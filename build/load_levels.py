@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 import tirelib
-from tirelib.threads import one_thread
+from tirelib.core.threads import one_thread
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "docs" / "tutorials"))

@@ -24,9 +24,9 @@ from fmpy import read_model_description
 from native_speed import RATE, frames
 
 from tests.fmu import live
+from tirelib.core.threads import one_thread
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.native import core_file
-from tirelib.threads import one_thread
 
 SAMPLES = 10
 ODD = "50% Prüfstand #1"

@@ -25,9 +25,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from tests.fmu import live
 from tests.synthetic import record
+from tirelib.core.held import HELD
+from tirelib.core.threads import one_thread
 from tirelib.fmu.build import build_fmu
-from tirelib.held import HELD
-from tirelib.threads import one_thread
 
 ROOT = Path(__file__).parents[1]
 

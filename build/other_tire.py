@@ -24,7 +24,9 @@ from road_coverage import measured, silent, tire_of
 
 from tirelib.campaign import read_campaign
 from tirelib.cli import limits
-from tirelib.core import choose_numpy
+from tirelib.core.compiled import choose_numpy
+from tirelib.core.flags import TurnFlag
+from tirelib.core.threads import one_thread
 from tirelib.estimators import likeness
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
@@ -32,11 +34,9 @@ from tirelib.estimators.likeness import DRIFT, suspected
 from tirelib.estimators.regressors import SIDED, compute_regressors
 from tirelib.estimators.result import other_tire
 from tirelib.estimators.train import train
-from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, observe
 from tirelib.rig.plans import Plan, plan
 from tirelib.rig.tire import Condition
-from tirelib.threads import one_thread
 
 PRESSURE, SPEED = 2.3e5, 65.0 / 3.6
 SEED = 51

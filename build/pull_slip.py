@@ -11,12 +11,12 @@ import click
 import numpy as np
 
 from tirelib.campaign import read_campaign
+from tirelib.core.threads import one_thread
 from tirelib.rig.campaign import TRUTH_FILE, run_plan
 from tirelib.rig.plans import Plan
 from tirelib.rig.tire import TIRES, Condition, tire
 from tirelib.signal import cut_turns
 from tirelib.signal.slip import pull
-from tirelib.threads import one_thread
 
 LOADS, SLIPS = (3000.0, 6000.0), (-0.03, -0.015, 0.0, 0.015, 0.03)
 PULLED = Plan(

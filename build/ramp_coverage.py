@@ -24,6 +24,7 @@ import numpy as np
 import pandas as pd
 
 from tirelib.campaign import Campaign, Run, read_campaign
+from tirelib.core.threads import one_thread
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.edge import EDGE_UNIT
 from tirelib.estimators.train import train
@@ -33,7 +34,6 @@ from tirelib.rig.campaign import TRUTH_FILE, run_plan
 from tirelib.rig.plans import Plan, plan
 from tirelib.rig.tire import Condition, tire
 from tirelib.signal import LowPass
-from tirelib.threads import one_thread
 
 KMH, LOADS = 1.0 / 3.6, (3000.0, 4800.0, 6600.0)
 STRAIGHT = Plan(

@@ -16,7 +16,8 @@ from unittest import mock
 import numpy as np
 from matplotlib.figure import Figure
 
-from tirelib.core import choose_numpy
+from tirelib.core.compiled import choose_numpy
+from tirelib.core.threads import one_thread
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.features.extract import extract_features
 from tirelib.fmu.virtual.options import Options
@@ -25,7 +26,6 @@ from tirelib.fmu.virtual.surface import read_surface
 from tirelib.fmu.virtual.wheel import VirtualWheel
 from tirelib.signal import LowPass, angle, cut_turns, slip, turns
 from tirelib.signal.angle import angle_law
-from tirelib.threads import one_thread
 
 ROOT = Path(__file__).parents[1]
 RATE, SAMPLES = 1e4, 20

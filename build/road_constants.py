@@ -21,7 +21,8 @@ import numpy as np
 from road_coverage import measured, rows_of, silent, tire_of
 
 from tirelib.campaign import read_campaign
-from tirelib.core import choose_numpy
+from tirelib.core.compiled import choose_numpy
+from tirelib.core.threads import one_thread
 from tirelib.estimators import any_road, chain, sliding, unknowns
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
@@ -32,7 +33,6 @@ from tirelib.estimators.unknowns import UNDER_GROOVES
 from tirelib.observations import Observations, mean_by, observe
 from tirelib.rig.plans import Plan
 from tirelib.rig.tire import NEW_DEPTH, Condition
-from tirelib.threads import one_thread
 
 TRIED: tuple[tuple[ModuleType, str, str], ...] = (
     (chain, "EDGE", "Fz"),

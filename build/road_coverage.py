@@ -19,8 +19,9 @@ import click
 import numpy as np
 from proof.tires import tire as random_tire
 
-from tirelib.arrays import BoolArray, FloatArray
 from tirelib.campaign import read_campaign
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.threads import one_thread
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.edge import EDGE_UNIT
@@ -32,7 +33,6 @@ from tirelib.report.style import BLUE, ORANGE, new_figure, save, styled
 from tirelib.rig.campaign import run_plan
 from tirelib.rig.plans import Plan, plan
 from tirelib.rig.tire import NEW_DEPTH, TIRES, Condition, RigTire, tire
-from tirelib.threads import one_thread
 
 Turns = tuple[Estimates, Observations]
 """What is estimated of a tire's turns, and the turns."""

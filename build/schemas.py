@@ -16,7 +16,7 @@ from typing import Any
 
 from genson import SchemaBuilder
 
-from tirelib.threads import one_thread
+from tirelib.core.threads import one_thread
 
 OUT = Path(__file__).resolve().parent.parent / "docs/reference/schemas"
 ABOUT = {

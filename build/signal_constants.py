@@ -17,9 +17,10 @@ import pandas as pd
 from road_constants import times
 from scipy.optimize import least_squares
 
-from tirelib.arrays import FloatArray
 from tirelib.campaign import conditions_of, read_campaign
-from tirelib.core import choose_numpy
+from tirelib.core.arrays import FloatArray
+from tirelib.core.compiled import choose_numpy
+from tirelib.core.threads import one_thread
 from tirelib.estimators import contact_length
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.contact_length import contact_lengths
@@ -27,7 +28,6 @@ from tirelib.features.extract import extract_features
 from tirelib.observations import observe
 from tirelib.signal import contacts, cut_turns
 from tirelib.signal import turns as turns_module
-from tirelib.threads import one_thread
 
 LENGTH = ("BIAS", "MIDDLE", "WIDTH", "LEAST_STD", "SHORT_STD", "SHORT_WIDTH")
 SHORT, LONG = 40, 200

@@ -19,12 +19,12 @@ import numpy as np
 from road_constants import times
 
 from tirelib.campaign import Campaign, Run, read_campaign
-from tirelib.core import choose_numpy
+from tirelib.core.compiled import choose_numpy
+from tirelib.core.flags import TurnFlag
+from tirelib.core.threads import one_thread
 from tirelib.estimators.calibration_file import read_calibration
-from tirelib.flags import TurnFlag
 from tirelib.observations import measure_run
 from tirelib.signal import LowPass, quality
-from tirelib.threads import one_thread
 
 THINNED = (1, 2, 5, 10)
 MARGIN = 20

@@ -24,9 +24,9 @@ from tirelib.contact import radial, shear
 from tirelib.contact.profiles import convex_concave, power_law
 from tirelib.contact.static import StaticContact, StaticTire, press_to_deflection
 from tirelib.contact.tread import Tread
+from tirelib.core.parameters import read_tire
 from tirelib.effects import CATALOGUE
 from tirelib.infer.plain import load
-from tirelib.parameters import read_tire
 from tirelib.report.style import label, legend_below, new_figure, sequence, styled
 from tirelib.ring.compliance import compliance
 from tirelib.ring.frequencies import natural_frequency, three_mode_sensitivity

@@ -8,7 +8,7 @@ from typing import Any
 from equations import page as equations
 from sphinx.pycode import ModuleAnalyzer
 
-from tirelib.flags import INVALIDATING, TurnFlag
+from tirelib.core.flags import INVALIDATING, TurnFlag
 from tirelib.fmu.variables import Variable, inputs, outputs, parameters
 from tirelib.fmu.virtual import table as virtual
 from tirelib.fmu.virtual.spec import friction_surface
@@ -69,7 +69,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def flags() -> str:
     """Return bit, name, meaning, consequence and remedy of every flag."""
-    said = ModuleAnalyzer.for_module("tirelib.flags").find_attr_docs()
+    said = ModuleAnalyzer.for_module("tirelib.core.flags").find_attr_docs()
     rows = [
         (
             flag.value,

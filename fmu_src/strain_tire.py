@@ -10,10 +10,10 @@ from collections.abc import Sequence
 import pythonfmu
 from pythonfmu import Fmi2Slave
 
+from tirelib.core.held import HELD
 from tirelib.fmu.slave import GuardedSlave
 from tirelib.fmu.variables import MISSING, Variable, inputs, outputs, parameters
 from tirelib.fmu.wheel import Wheel, check_missing, embedded_calibration, load_wheel
-from tirelib.held import HELD
 from tirelib.stream.estimator import RATES
 
 

@@ -11,7 +11,7 @@ import pythonfmu
 from pythonfmu import Fmi2Slave
 
 from tirelib.brush import predict
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.fmu.refusals import StepError
 from tirelib.fmu.slave import GuardedSlave, Model
 from tirelib.fmu.variables import Variable

@@ -24,13 +24,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tirelib.campaign import check_campaign, read_campaign
     from tirelib.campaign.importing.importer import import_campaign
+    from tirelib.core.parameters import read_tire, write_tire
     from tirelib.estimators.calibration_file import read_calibration, write_calibration
     from tirelib.estimators.train import train
     from tirelib.fmu.build import build_fmu
     from tirelib.fmu.check import check_fmu
     from tirelib.journey import add, compare, diagnose, identify, simulate
     from tirelib.observations import observe
-    from tirelib.parameters import read_tire, write_tire
     from tirelib.stream import StreamEstimator
     from tirelib.tables import candidate_table, estimate_table, feature_table, parameter_table
 
@@ -76,11 +76,11 @@ _HOMES = {
     "parameter_table": "tirelib.tables",
     "read_calibration": "tirelib.estimators.calibration_file",
     "read_campaign": "tirelib.campaign",
-    "read_tire": "tirelib.parameters",
+    "read_tire": "tirelib.core.parameters",
     "simulate": _JOURNEY,
     "train": "tirelib.estimators.train",
     "write_calibration": "tirelib.estimators.calibration_file",
-    "write_tire": "tirelib.parameters",
+    "write_tire": "tirelib.core.parameters",
 }
 """The module of each name; three names are those of a package, see `_Verb`."""
 

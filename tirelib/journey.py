@@ -8,17 +8,17 @@ They are offered as `tirelib.identify`, `tirelib.compare`, `tirelib.diagnose`, `
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from tirelib.errors import CalibrationError, ParameterError
+from tirelib.core.errors import CalibrationError, ParameterError
 
 if TYPE_CHECKING:
-    from tirelib.arrays import FloatArray
     from tirelib.campaign import Campaign
     from tirelib.compare import Comparison, ForceComparison
+    from tirelib.core.arrays import FloatArray
+    from tirelib.core.parameters import TireFile
     from tirelib.diagnose.document import Assessment
     from tirelib.diagnose.forces.assess import ForceAssessment
     from tirelib.effects import Effect
     from tirelib.identify.whole import Whole
-    from tirelib.parameters import TireFile
     from tirelib.report.simulation import Simulation
 
 QUANTITIES = ("strain", "Fy", "Fx", "Mz")

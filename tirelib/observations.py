@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.campaign import Campaign, CampaignHeader, Run, conditions_of
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import CalibrationError
+from tirelib.core.flags import INVALIDATING
+from tirelib.core.sizes import differing
 from tirelib.features import Features, RecordReader
-from tirelib.flags import INVALIDATING
 from tirelib.signal import LowPass
-from tirelib.sizes import differing
 
 TRUTH = ("Fx", "Fy", "Fz", "Mz", "slip_angle", "slip_ratio")
 """Rig quantities that an estimate is held against."""

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tirelib.errors import ParameterError
-from tirelib.flags import flag_names
-from tirelib.units import TABLE
+from tirelib.core.errors import ParameterError
+from tirelib.core.flags import flag_names
+from tirelib.core.units import TABLE
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from tirelib.core.parameters import TireFile
     from tirelib.diagnose.document import Assessment
     from tirelib.diagnose.forces.assess import ForceAssessment
     from tirelib.estimators.calibration import Estimates
     from tirelib.observations import Observations
-    from tirelib.parameters import TireFile
 
 UNITS = {"time": "s", "Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
 SI_UNITS = {
@@ -121,7 +121,7 @@ def parameter_table(model: "TireFile") -> "pd.DataFrame":
     """
     import pandas as pd  # slow to import
 
-    from tirelib.parameters import NUMBERS
+    from tirelib.core.parameters import NUMBERS
 
     nothing = [np.nan, np.nan]
     rows = {}

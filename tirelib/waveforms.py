@@ -10,10 +10,10 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.campaign import Campaign, CampaignHeader, Run
-from tirelib.errors import CalibrationError
-from tirelib.flags import INVALIDATING
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import CalibrationError
+from tirelib.core.flags import INVALIDATING
 from tirelib.signal import LowPass, Turns, cut_turns
 from tirelib.signal.lowpass import smooth_to_angle
 

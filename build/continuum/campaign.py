@@ -23,7 +23,7 @@ from tirelib.campaign import (
     write_campaign,
 )
 from tirelib.campaign import Run as Written
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 KMH, BAR = 1.0 / 3.6, 1e5
 LOADS = (2400.0, 3600.0, 4800.0, 6000.0, 7200.0)

@@ -17,8 +17,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from continuum.campaign import make
 from continuum.effects import EFFECTS
-from tirelib.errors import TirelibError
-from tirelib.threads import one_thread
+from tirelib.core.errors import TirelibError
+from tirelib.core.threads import one_thread
 
 
 def _effects() -> str:

@@ -44,9 +44,9 @@ from cosim.vehicle14.files import make_vehicle
 from cosim.vehicle14.model import SIDE_SLIP, Controls
 from cosim.vehicle14.run import Drive
 from cosim.wheels import FourWheels
-from tirelib.arrays import FloatArray
-from tirelib.errors import ConvergenceError
-from tirelib.threads import one_thread
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError
+from tirelib.core.threads import one_thread
 
 SPEED, END_SPEED = 80.0 / 3.6, 25.0 / 3.6
 """The way is counted between these [m/s]."""

@@ -14,7 +14,7 @@ from cosim.closed_loop_sources import STEP, Known, Perfect, Strain
 from cosim.today import Sensors, TodaysBrakes
 from cosim.traction import TractionController
 from cosim.vehicle14.model import Wheels
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 PEDAL = np.array([1800.0, 1800.0, 780.0, 780.0])
 """What the driver asks of each brake: a stop of 1.07 g [N m]."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.vehicle14.model import Wheels
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 FALLING = 0.1
 """Share of the friction that 10 m/s of sliding take: mu exp(-s v_s / (10 m/s)), the law of

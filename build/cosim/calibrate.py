@@ -19,12 +19,12 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import qmc
 
-from tirelib.arrays import FloatArray
 from tirelib.cli.progress import progress_bar
+from tirelib.core.arrays import FloatArray
+from tirelib.core.threads import one_thread
 from tirelib.rig.campaign import TRUTH_FILE, run_plan
 from tirelib.rig.plans import Plan
 from tirelib.rig.tire import Condition, tire
-from tirelib.threads import one_thread
 
 CALIBRATION = Path(__file__).with_name("calibration.toml")
 """The calibration of the co-simulations."""

@@ -26,9 +26,9 @@ from cosim.vehicle14.files import make_vehicle
 from cosim.vehicle14.model import SPIN, Controls
 from cosim.vehicle14.run import Drive
 from cosim.wheels import FourWheels
-from tirelib.arrays import FloatArray
-from tirelib.errors import ConvergenceError, ParameterError
-from tirelib.threads import one_thread
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError, ParameterError
+from tirelib.core.threads import one_thread
 
 YAW, YAW_RATE = 5, 15
 """Places in the vehicle's state."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.closed_loop_sources import STEP, Known
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 
 @dataclass(frozen=True)

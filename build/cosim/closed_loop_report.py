@@ -9,7 +9,7 @@ from plotly.subplots import make_subplots
 
 from cosim.closed_loop import ROADS, BrakingRun, Outcome, Study
 from cosim.closed_loop_controller import SlipController
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import Table, number
 from tirelib.report.parts_page import Part

@@ -14,7 +14,7 @@ import numpy as np
 
 from cosim.vehicle14.model import Wheels
 from cosim.wheels import OWN_FRICTION, FourWheels, WheelStates
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 
 STEP = 2e-3
 """Communication step, and that of the controller [s]."""

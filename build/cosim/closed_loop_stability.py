@@ -27,8 +27,8 @@ from cosim.vehicle14.files import make_vehicle
 from cosim.vehicle14.model import SPIN, Controls
 from cosim.vehicle14.run import Drive
 from cosim.wheels import FourWheels
-from tirelib.arrays import FloatArray
-from tirelib.threads import one_thread
+from tirelib.core.arrays import FloatArray
+from tirelib.core.threads import one_thread
 
 FORWARD, SIDE = 10, 11
 """Places in the vehicle's state: velocities in its axes."""

@@ -35,8 +35,8 @@ from cosim.vehicle14.parameters import GRAVITY, VehicleParameters
 from cosim.vehicle14.run import Drive
 from cosim.water import SPREAD, water_table, wedge_pressure
 from cosim.wheels import OWN_FRICTION, Estimates, FourWheels, WheelStates
-from tirelib.arrays import FloatArray
-from tirelib.threads import one_thread
+from tirelib.core.arrays import FloatArray
+from tirelib.core.threads import one_thread
 
 SPEED = 100.0 / 3.6
 """At the start [m/s]."""

@@ -21,9 +21,9 @@ from cosim.calibrate import CALIBRATION
 from cosim.manoeuvres import MANOEUVRES
 from cosim.recording import RATE, STEP, drive, follow
 from cosim.wheels import FourWheels
+from tirelib.core.threads import one_thread
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.virtual.spec import build_virtual, friction_surface
-from tirelib.threads import one_thread
 
 
 def main() -> None:

@@ -25,7 +25,7 @@ from cosim.calibrate import CALIBRATION
 from cosim.manoeuvres import MANOEUVRES
 from cosim.recording import STEP, build_fmus
 from cosim.run import DRILL, LOOPS, work
-from tirelib.threads import one_thread
+from tirelib.core.threads import one_thread
 
 
 def leaves(found: Any, place: str = "") -> Iterator[tuple[str, Any]]:

@@ -9,7 +9,7 @@ import numpy as np
 from cosim.manoeuvres import Manoeuvre
 from cosim.vehicle import Motion, Vehicle
 from cosim.wheels import NAMES, WHEELS, FourWheels, WheelStates
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.virtual.coordinates import FRICTION, INPUTS
 from tirelib.fmu.virtual.spec import build_virtual, friction_surface

@@ -43,8 +43,8 @@ from cosim.score import COVERED, LIMITS, score, turns_of
 from cosim.wheels import WHEELS, FourWheels
 from tirelib import __version__
 from tirelib.cli.progress import progress_bar
+from tirelib.core.threads import one_thread
 from tirelib.rig.campaign import THREADS
-from tirelib.threads import one_thread
 
 ROOT = Path(__file__).parents[2]
 DRILL, STABILITY, WATER = "range", "stability", "hydroplaning"

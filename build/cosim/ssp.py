@@ -18,10 +18,10 @@ from xml.etree import ElementTree as Xml
 from fmpy import read_model_description
 
 from cosim.vehicle14.parameters import WHEELS
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
+from tirelib.core.threads import one_thread
 from tirelib.fmu.describe import UNITS, repack
 from tirelib.fmu.virtual.coordinates import INPUTS
-from tirelib.threads import one_thread
 
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"

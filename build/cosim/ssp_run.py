@@ -24,9 +24,9 @@ from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from cosim.ssp import SET, SSD
 from cosim.vehicle14.parameters import WHEELS
-from tirelib.arrays import FloatArray
-from tirelib.errors import FormatError, ParameterError
-from tirelib.threads import one_thread
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import FormatError, ParameterError
+from tirelib.core.threads import one_thread
 
 WATCHED = (
     *(f"vehicle.{q}_{w}" for q in ("Fz", "alpha", "kappa", "Fx", "Fy") for w in WHEELS),

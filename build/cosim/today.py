@@ -21,7 +21,7 @@ import numpy as np
 
 from cosim.vehicle14.model import ANGLES, RATES, SPIN, Motion, rotation
 from cosim.vehicle14.parameters import GRAVITY, VehicleParameters
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 
 @dataclass(frozen=True)

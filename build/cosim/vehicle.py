@@ -25,9 +25,9 @@ from vehiclemodels.init_mb import init_mb
 from vehiclemodels.vehicle_parameters import setup_vehicle_parameters
 
 from cosim.wheels import OWN_FRICTION, WheelStates
-from tirelib.arrays import FloatArray
-from tirelib.axes import sign
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.axes import sign
+from tirelib.core.errors import ParameterError
 
 _PLACES = ("LF", "RF", "LR", "RR")
 """The model's names of `WHEELS`, in this order."""

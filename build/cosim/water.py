@@ -16,7 +16,8 @@ import numpy as np
 
 from cosim.calibrate import CALIBRATION
 from cosim.wheels import PRESSURE
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.threads import one_thread
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.features.extract import extract_features
@@ -25,7 +26,6 @@ from tirelib.rig.observe import contact, trace
 from tirelib.rig.solve import State, solve
 from tirelib.rig.tire import NEW_DEPTH, Condition, RigTire, tire
 from tirelib.signal import LowPass, cut_turns
-from tirelib.threads import one_thread
 
 DENSITY = 1000.0
 """Density of water [kg/m^3]."""

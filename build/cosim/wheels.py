@@ -21,13 +21,13 @@ import numpy as np
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import ParameterError
+from tirelib.core.held import HELD
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.fmu.run import LoadedFmu
 from tirelib.fmu.virtual.coordinates import FRICTION, INPUTS
 from tirelib.fmu.virtual.table import START
-from tirelib.held import HELD
 
 if TYPE_CHECKING:
     from cosim.water import WaterTable
@@ -133,7 +133,7 @@ class Estimates:
     turn : int array
         Contacts so far: it counts up when an estimate is new.
     flags : int array
-        `tirelib.flags.TurnFlag` bits.
+        `tirelib.core.flags.TurnFlag` bits.
     tire_omega, tire_angle : array, [rad/s], [rad]
         Turn rate and angle of the gages of the virtual tire (0: over the road).
     tire_alpha, tire_kappa : array, [rad], [1]

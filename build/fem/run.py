@@ -18,7 +18,7 @@ from cases import CHECKS, STORED, Case
 from fields import states
 from rich.console import Console
 
-from tirelib.threads import one_thread
+from tirelib.core.threads import one_thread
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "build" / "out" / "fem"

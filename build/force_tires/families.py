@@ -16,7 +16,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 
 @dataclass(frozen=True)

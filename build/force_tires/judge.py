@@ -20,10 +20,10 @@ from force_tires.bench import problem_of
 from force_tires.families import FAMILIES
 from force_tires.learn import OUT, say, seeds
 from force_tires.plans import KNOWN, UNKNOWN, case
-from tirelib.errors import TirelibError
+from tirelib.core.errors import TirelibError
+from tirelib.core.threads import one_thread
 from tirelib.infer.plain import covering, load
 from tirelib.infer.select import Verdict, select
-from tirelib.threads import one_thread
 
 
 def main() -> None:

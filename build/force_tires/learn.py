@@ -24,13 +24,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from force_tires.bench import problem_of
 from force_tires.families import FAMILIES
 from force_tires.plans import case
-from tirelib.errors import TirelibError
+from tirelib.core.errors import TirelibError
+from tirelib.core.threads import one_thread
 from tirelib.infer.hypothesis import judged
 from tirelib.infer.null import OWN
 from tirelib.infer.plain import Family, covering, learn, save
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.problems.forces import ForceProblem
-from tirelib.threads import one_thread
 
 HERE = Path(__file__).parent
 OUT = Path(__file__).parents[2] / "tirelib" / "infer"

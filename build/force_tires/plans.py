@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from force_tires.families import FAMILIES, Changes, Setting
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.identify.force_data import ForceData
 
 RATE, PERIOD, PAUSE = 12.0, 12.0, 8.0

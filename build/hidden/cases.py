@@ -19,8 +19,8 @@ import numpy as np
 
 from hidden.measured import CACHE, Plain, Planted, blank, keep, plain, traces, waveforms
 from hidden.plan import day
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.errors import TirelibError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
 from tirelib.identify.waveform_fit import WaveformFit

@@ -13,9 +13,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from hidden.cases import NONE, case_file, make_case
 from hidden.measured import CACHE
-from tirelib.errors import TirelibError
+from tirelib.core.errors import TirelibError
+from tirelib.core.threads import one_thread
 from tirelib.rig.hidden import HIDDEN
-from tirelib.threads import one_thread
 
 
 def seeds(text: str) -> list[int]:

@@ -14,7 +14,7 @@ from zlib import crc32
 import numpy as np
 
 from hidden.plan import Day, day
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.rig.campaign import rig_header
 from tirelib.rig.hidden import HIDDEN
 from tirelib.rig.measure import gages

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.rig.measure import MeasuringChain, settle
 from tirelib.rig.plans import KMH
 from tirelib.rig.tire import Condition, RigTire

@@ -17,8 +17,8 @@ from scipy.linalg import subspace_angles
 
 from next_test.pair import REFERENCE, Pair, PairCase, foretold, look_alikes, open_still
 from tests.magic_sweep import _force
-from tirelib.arrays import FloatArray
 from tirelib.compare.force_model import ForceModel
+from tirelib.core.arrays import FloatArray
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.fit import MeasuredForce
 from tirelib.diagnose.forces.models import plain_tires

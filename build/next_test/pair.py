@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError
 from tirelib.infer.select import Hypotheses
 from tirelib.planning.criterion import NextTest
 

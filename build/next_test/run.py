@@ -26,9 +26,9 @@ from hidden.measured import keep
 import tirelib
 from next_test import forces
 from next_test.pair import CACHE, cases_of, open_still
-from tirelib.errors import TirelibError
+from tirelib.core.errors import TirelibError
+from tirelib.core.threads import one_thread
 from tirelib.planning.document import PROMISING
-from tirelib.threads import one_thread
 
 VISIBLE = 17.0
 """Chi-square by which the campaign alone shows the effect, against none, in the metric of what

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.edge import EDGE_UNIT
 from tirelib.report.accuracy import TITLE
 from tirelib.report.page import DASH, Table

@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import DASH, Table, number
 from tirelib.report.parts_page import Part, write_parts_page

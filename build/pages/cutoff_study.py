@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign, Run, RunPlan
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError
+from tirelib.core.flags import TurnFlag
 from tirelib.features.extract import Features, extract_features
-from tirelib.flags import TurnFlag
 from tirelib.signal import LowPass, cut_turns
 from tirelib.signal.lowpass import SUITABLE_ORDERS
 

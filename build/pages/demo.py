@@ -16,7 +16,7 @@ from pages.figures.strain import figure_3_7, figure_4_1
 from pages.live import LiveFiles, live_drawing, live_table, live_text, read_line
 from pages.turns import TypicalTurns, typical_turns
 from tirelib.campaign import Campaign, RunPlan, read_campaign
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.train import Trained, train
 from tirelib.observations import Observations, observe

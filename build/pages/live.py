@@ -17,9 +17,9 @@ from pages.agreement import (
     read_turns,
 )
 from pages.figures.live import LastTurn, Strip, figure_live
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.campaign import Campaign
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.errors import CalibrationError
 from tirelib.report.accuracy import QUANTITIES
 from tirelib.report.page import Drawing, Table
 from tirelib.signal import LowPass, cut_turns

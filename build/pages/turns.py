@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from tirelib.campaign import Campaign, RunPlan, conditions_of
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
+from tirelib.core.traces import Conditions, StrainTrace
 from tirelib.features import Features, concatenate_features, extract_features
 from tirelib.signal import LowPass, Turns, cut_turns
-from tirelib.traces import Conditions, StrainTrace
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,13 +10,13 @@ import numpy as np
 
 from proof.laboratory import CREEP, laboratory, press
 from proof.tires import CACHE, measured
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.parameters import Tire
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
 from tirelib.model.base import operating_points, values_of
 from tirelib.model.solution import solved
 from tirelib.model.state import Operating
-from tirelib.parameters import Tire
 from tirelib.rig.solve import inflated
 from tirelib.rig.tire import RigTire
 from tirelib.signal import LowPass

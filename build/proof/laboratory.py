@@ -30,7 +30,7 @@ STEP = 5e3
 
 @dataclass(frozen=True)
 class Laboratory:
-    """Values of the laboratory, by name of `tirelib.parameters.Tire`, and what stands behind them.
+    """Values of the laboratory, by name of `tirelib.core.parameters.Tire`, and their sources.
 
     Attributes
     ----------

@@ -23,8 +23,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from proof.case import case
 from proof.tires import CACHE
 from tirelib import __version__
+from tirelib.core.threads import one_thread
 from tirelib.identify.structure import STRUCTURE_STD
-from tirelib.threads import one_thread
 
 TYPICAL = {
     "radial_pressure_slope": 1.0,

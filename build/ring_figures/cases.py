@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.static import StaticContact, StaticTire, press_to_load
-from tirelib.parameters import Tire
+from tirelib.core.arrays import FloatArray
+from tirelib.core.parameters import Tire
 from tirelib.report.simulation import Simulation, simulate
 from tirelib.ring.green import pressed_shape
 

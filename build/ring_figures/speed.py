@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.units import from_si
 from tirelib.report.figures.ring_panels import (
     PRESSURE,
     RATE,
@@ -27,7 +28,6 @@ from tirelib.report.style import (
     styled,
     zero_line,
 )
-from tirelib.units import from_si
 
 
 def compression_to_edge(done: Simulation) -> FloatArray:

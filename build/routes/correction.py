@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.free_boundary import Start
+from tirelib.core.arrays import FloatArray
 from tirelib.model.base import predict
 from tirelib.model.chain import Changes
 from tirelib.model.solution import solved

@@ -15,11 +15,11 @@ from typing import Literal
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact import radial, shear
 from tirelib.contact.shear_law import Shear
 from tirelib.contact.tread import Tread
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.model.base import smoothed
 from tirelib.model.state import Operating, State
 from tirelib.ring.compliance import Compliance, compliance

@@ -12,7 +12,7 @@ from routes.edges import Edges
 from routes.follow import Routes
 from routes.static_route import PressureShape, StaticRoute
 from routes.static_route_fit import Quantity
-from tirelib.errors import TirelibError
+from tirelib.core.errors import TirelibError
 
 DEG = 180.0 / np.pi
 _POINTS = 41

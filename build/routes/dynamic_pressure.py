@@ -12,11 +12,11 @@ from typing import Literal
 import numpy as np
 
 from routes.damped_ring import SHEAR_SHARE, Law, damped_compliance
-from tirelib.arrays import FloatArray
 from tirelib.contact import radial, shear
 from tirelib.contact.shear_law import Shear
 from tirelib.contact.tread import Tread
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import Ring
 

@@ -37,10 +37,10 @@ from routes.dynamic_route_validation import (
 )
 from routes.edges import Edges
 from routes.static_route_fit import Quantity
-from tirelib.arrays import FloatArray
-from tirelib.errors import CalibrationError, ConvergenceError, ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError, ConvergenceError, ParameterError
+from tirelib.core.parameters import TireFile
 from tirelib.identify.campaign_data import StraightRuns
-from tirelib.parameters import TireFile
 
 
 @dataclass(frozen=True, slots=True)

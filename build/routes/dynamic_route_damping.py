@@ -26,8 +26,8 @@ import numpy as np
 from routes.damped_ring import SHEAR_SHARE, Law, damped_waveform
 from routes.edges import EdgeReading, read_edges
 from routes.static_route_fit import Parameter, Quantity, fit_few
-from tirelib.arrays import FloatArray
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.model.base import operating_points
 from tirelib.model.state import Operating

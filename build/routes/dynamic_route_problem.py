@@ -10,13 +10,13 @@ from routes.correction import Correction, large_displacements
 from routes.dynamic_route_validation import predicted_deflection
 from routes.edges import STRUCTURE, Edges, corrected, edge_bias, model_edges, read_edges
 from routes.static_route_fit import FewFit, Parameter, Quantity, fit_few
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact import radial
-from tirelib.errors import CalibrationError, ConvergenceError, ParameterError
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.errors import CalibrationError, ConvergenceError, ParameterError
+from tirelib.core.parameters import TireFile
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.model.base import operating_points, values_of
 from tirelib.model.state import State
-from tirelib.parameters import TireFile
 from tirelib.ring.compliance import compliance
 from tirelib.waveforms import GRID
 

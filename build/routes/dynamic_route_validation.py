@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact import radial
 from tirelib.contact.exact import load_exact
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.model.state import Operating, State
 from tirelib.ring.compliance import compliance

@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from routes.correction import Correction, predict_with
-from tirelib.arrays import BoolArray, FloatArray
 from tirelib.contact.exact import load_exact
-from tirelib.errors import CalibrationError, ShapeError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import CalibrationError, ShapeError
 from tirelib.features.peaks import peak
 from tirelib.model.base import predict, smoothed
 from tirelib.model.state import Operating

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from routes.dynamic_route import DynamicRoute, dynamic_route
 from routes.static_route import StaticRoute, static_route
 from routes.static_route_fit import Quantity
-from tirelib.errors import TirelibError
+from tirelib.core.errors import TirelibError
+from tirelib.core.parameters import TireFile
 from tirelib.identify.campaign_data import StraightRuns
-from tirelib.parameters import TireFile
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,10 +24,10 @@ from routes.document import routes_document
 from routes.follow import follow_routes
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import write_json
+from tirelib.core.parameters import read_tire
+from tirelib.core.threads import one_thread
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import start_file
-from tirelib.parameters import read_tire
-from tirelib.threads import one_thread
 from tirelib.waveforms import measure_waveforms
 
 FORMAT = "routes/1"

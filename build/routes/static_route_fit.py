@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ConvergenceError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError
 
 TOLD = 0.6
 """Share of the prior's deviation below which the data have told something."""

@@ -3,12 +3,12 @@
 import numpy as np
 
 from routes.static_route_fit import FewFit, Parameter, Quantity, fit_few, profile
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact.profiles import convex_concave
 from tirelib.contact.static import StaticContact, StaticTire, press_to_deflection
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.errors import ConvergenceError, ParameterError
+from tirelib.core.parameters import TireFile
 from tirelib.identify.campaign_data import StraightRuns
-from tirelib.parameters import TireFile
 from tirelib.ring.green import modal_response
 from tirelib.signal import LowPass
 from tirelib.strain.deformation import (

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import BoolArray
 from tirelib.campaign import CampaignHeader, TireGeometry, Tolerance
+from tirelib.core.arrays import BoolArray
 from tirelib.signal import LowPass
 from tirelib.waveforms import Waveforms
 

@@ -15,8 +15,8 @@ from continuum.measure import Laboratory, laboratory, settled
 from continuum.tire import Condition
 
 from structure.family import LATERAL, PHI, Array, Frame, Setting
-from tirelib.arrays import IntArray
 from tirelib.campaign import CampaignHeader, TireGeometry, Tolerance
+from tirelib.core.arrays import IntArray
 from tirelib.signal import LowPass
 from tirelib.waveforms import CONDITIONS, N_PHI, Waveforms
 

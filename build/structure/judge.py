@@ -27,16 +27,16 @@ import numpy as np
 
 from structure.cases import NONE, load_case
 from structure.learn import FAMILIES, OUT, TABLE, say
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import TirelibError
+from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE
-from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.identify import estimated
 from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.plain import load
 from tirelib.infer.select import Verdict, select
 from tirelib.problems.strain import StrainProblem
-from tirelib.threads import one_thread
 
 OUTCOMES = ("right", "in a set", "none", "unknown", "form", "wrong", "failed")
 

@@ -18,8 +18,9 @@ import numpy as np
 from structure.cases import load_case
 from structure.judge import _identified
 from structure.learn import FAMILIES, OUT, TABLE, say
+from tirelib.core.errors import TirelibError
+from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE
-from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.infer.hypothesis import law_errors
 from tirelib.infer.null import OWN, Null
@@ -27,7 +28,6 @@ from tirelib.infer.plain import BASE, Family, load, pooled
 from tirelib.infer.posterior import posterior, sizes_at_start
 from tirelib.infer.problem import Point
 from tirelib.problems.strain import StrainProblem
-from tirelib.threads import one_thread
 
 GRID = tuple(0.15 * 2.0 ** np.arange(-3, 4))
 

@@ -25,8 +25,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from structure.cases import NONE, case_file, load_case
 from structure.make import seeds
+from tirelib.core.errors import TirelibError
+from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE
-from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
 from tirelib.infer.hypothesis import judged
@@ -35,7 +36,6 @@ from tirelib.infer.plain import Family, learn, save
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Point
 from tirelib.problems.strain import StrainProblem
-from tirelib.threads import one_thread
 
 ROOT = Path(__file__).parents[2]
 OUT = ROOT / "build" / "out" / "structure"

@@ -25,8 +25,8 @@ from structure.family import Family
 from structure.planted import planted_cases
 from structure.rig import Rig
 from structure.ring import Ring
-from tirelib.errors import TirelibError
-from tirelib.threads import one_thread
+from tirelib.core.errors import TirelibError
+from tirelib.core.threads import one_thread
 
 FAMILIES: dict[str, Family] = {f.name: f for f in (Rig(), Elements(), Ring())}
 OUT = Path(__file__).parents[1] / "out" / "structure"

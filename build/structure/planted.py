@@ -16,7 +16,7 @@ from structure.cases import Case
 from structure.day import Day, day, measured
 from structure.family import Array, Family, Frame
 from structure.ratio import Yard
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.waveforms import Waveforms
 
 ROUNDS = 14

@@ -15,9 +15,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from structure.learn import FAMILIES, OUT, TABLE, kept_fit, say
 from structure.make import seeds
+from tirelib.core.threads import one_thread
 from tirelib.infer.hypothesis import judged
 from tirelib.infer.plain import load
-from tirelib.threads import one_thread
 
 LEVEL = 0.05
 

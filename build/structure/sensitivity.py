@@ -22,10 +22,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from structure.cases import NONE
 from structure.learn import FAMILIES, OUT, TABLE, Fit, fits_of, kept_fit, say
 from structure.make import seeds
+from tirelib.core.threads import one_thread
 from tirelib.infer import hypothesis, null, plain
 from tirelib.infer.hypothesis import judged
 from tirelib.infer.plain import Family, load
-from tirelib.threads import one_thread
 
 LEVEL = 0.05
 LARGEST = 1.3

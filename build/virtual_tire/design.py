@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import qmc
 
+from tirelib.core.threads import one_thread
 from tirelib.rig.measure import slip_ratio
 from tirelib.rig.observe import edges, forces, trace
 from tirelib.rig.solve import SolverError, State, solve
 from tirelib.rig.tire import Condition, tire
-from tirelib.threads import one_thread
 
 OUT = Path(__file__).parents[1] / "out" / "virtual_tire"
 OUT_FRICTION = OUT.parent / "virtual_tire_friction"

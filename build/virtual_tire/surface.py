@@ -22,6 +22,7 @@ from scipy.interpolate import CubicSpline, RBFInterpolator
 from scipy.optimize import minimize
 
 from tirelib import __version__
+from tirelib.core.threads import one_thread
 from tirelib.fmu.virtual.coordinates import coordinates, half_angle, warped
 from tirelib.fmu.virtual.surface import (
     DEGREE,
@@ -32,7 +33,6 @@ from tirelib.fmu.virtual.surface import (
     write_surface,
 )
 from tirelib.rig.tire import tire
-from tirelib.threads import one_thread
 
 GRID = 720
 """Angles of a component."""

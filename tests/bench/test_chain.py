@@ -17,12 +17,12 @@ from tirebench.recording.document import document
 from tirebench.wire.conditions import Condition, Conditions, condition
 from tirebench.wire.device import Device
 from tirebench.wire.frames import SAMPLES
-from tirelib.arrays import FloatArray
 from tirelib.campaign import read_campaign
+from tirelib.core.arrays import FloatArray
+from tirelib.core.flags import TurnFlag
+from tirelib.core.held import HELD
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.result import estimate_document
-from tirelib.flags import TurnFlag
-from tirelib.held import HELD
 from tirelib.observations import observe
 from tirelib.stream import StreamEstimator
 

@@ -28,7 +28,7 @@ from tirebench.wire.conditions import Conditions
 from tirebench.wire.device import Device, parse_device, read_device
 from tirebench.wire.frames import encode, strain_frames
 from tirebench.wire.gage_setup import apparent_strain, device_text, shunted, zeroed
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 OFFSET = np.array([120.0, -340.0, 5.0, 0.0, 1800.0])
 WHEEL = Device("wheel 3", scale=1e-6, lateral=(0.06, 0.03, 0.0, -0.03, -0.06))

@@ -18,7 +18,7 @@ from tirebench.page.feed import About
 from tirebench.page.live import LivePage, PageChoice
 from tirebench.page.quantities import UNITS
 from tirebench.wire.conditions import Conditions
-from tirelib.flags import TurnFlag
+from tirelib.core.flags import TurnFlag
 
 
 def test_without_data_the_page_says_what_it_waits_for(browser: Any) -> None:

@@ -46,7 +46,7 @@ from tirebench.recording.replay import ReplayChain
 from tirebench.setup.source_plan import SourcePlan
 from tirebench.wire.conditions import Condition, Conditions
 from tirebench.wire.device import Device
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 STEADY = Conditions.constant(18.0, 2.3e5, 0.0)
 

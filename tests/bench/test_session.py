@@ -17,7 +17,7 @@ from tirebench.links import Read
 from tirebench.recording.replay import ReplayChain
 from tirebench.wire.conditions import Condition, Conditions
 from tirebench.wire.device import Device
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 
 class Counter:

@@ -25,9 +25,9 @@ from tirebench.links.opening import PortPlan
 from tirebench.links.reconnecting import ReconnectingLink
 from tirebench.setup.source_plan import SourcePlan, wheels_of
 from tirebench.wire.conditions import TELLABLE, UNITS, Condition, Conditions
-from tirelib.arrays import FloatArray
-from tirelib.held import HELD
-from tirelib.units import to_si
+from tirelib.core.arrays import FloatArray
+from tirelib.core.held import HELD
+from tirelib.core.units import to_si
 
 ROAD = {"friction": 0.9, "tread_depth": 0.008, "tread_temperature": 313.15}
 

@@ -17,7 +17,7 @@ from tirebench.protocols.user_map import parse_map, read_map
 from tirebench.wire.can_batch import joined, pack, same_kind
 from tirebench.wire.conditions import Condition, Conditions, Held, Measured
 from tirebench.wire.timeline import Timeline
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 DBC = """VERSION ""
 BU_: W

@@ -19,7 +19,7 @@ from tirebench.recording.document import document, wheel_document
 from tirebench.wire.clock import ClockFit
 from tirebench.wire.conditions import Condition, Conditions
 from tirebench.wire.device import Device
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 
 class Sums:

@@ -15,7 +15,7 @@ import pytest
 from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import read_campaign
 from tirelib.cli import main
-from tirelib.threads import VARIABLES
+from tirelib.core.threads import VARIABLES
 
 
 def alone(*words: object) -> subprocess.CompletedProcess[str]:

@@ -15,11 +15,11 @@ from tests.synthetic import LATERAL, RATE, header
 from tests.unit.compare.compare_synthetic import bump, model_file, plan, points_of
 from tirelib.brush.predict import PointConditions, predict_forces
 from tirelib.campaign import Run, RunPlan, write_campaign
+from tirelib.core.parameters import Number, TireFile, write_tire
 from tirelib.identify.brush_model import brush_of
 from tirelib.identify.force_data import ForceData
 from tirelib.model.base import values_of
 from tirelib.model.solution import solved
-from tirelib.parameters import Number, TireFile, write_tire
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID
 

@@ -212,7 +212,7 @@ def test_the_library_refuses_another_tire(campaigns: Path, tmp_path: Path) -> No
     from pages.demo import write_demo_page
 
     from tirelib.campaign import read_campaign
-    from tirelib.errors import CalibrationError
+    from tirelib.core.errors import CalibrationError
     from tirelib.estimators.train import train
     from tirelib.observations import observe
 

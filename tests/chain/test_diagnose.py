@@ -11,9 +11,9 @@ from click.testing import CliRunner, Result
 
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, added, model_file, waves
 from tirelib.cli import program
+from tirelib.core.errors import TirelibError
+from tirelib.core.parameters import read_tire, write_tire
 from tirelib.effects import CATALOGUE
-from tirelib.errors import TirelibError
-from tirelib.parameters import read_tire, write_tire
 from tirelib.waveforms import Waveforms
 
 MINE = """

@@ -15,8 +15,8 @@ from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
 from tests.unit.force_campaigns import brush_file, steady_runs, write_forces
 from tirelib import waveforms
 from tirelib.cli import program
-from tirelib.errors import TirelibError
-from tirelib.parameters import read_tire, write_tire
+from tirelib.core.errors import TirelibError
+from tirelib.core.parameters import read_tire, write_tire
 
 KEYS = {
     "format",

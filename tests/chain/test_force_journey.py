@@ -15,8 +15,8 @@ from click.testing import CliRunner, Result
 from tests.unit.force_campaigns import brush_file, steady_runs, write_forces, write_sweep
 from tirelib.campaign import read_campaign
 from tirelib.cli import program
-from tirelib.errors import TirelibError
-from tirelib.parameters import write_tire
+from tirelib.core.errors import TirelibError
+from tirelib.core.parameters import write_tire
 
 PLANTED = {"friction_pressure": 0.3, "stiffness_temperature": 0.5, "brush_camber": 0.08}
 MINE = """

@@ -11,11 +11,11 @@ from click.testing import CliRunner
 
 from tests.chain.test_command_line import run
 from tests.synthetic import synthetic_run, write
-from tirelib.arrays import FloatArray
 from tirelib.campaign import read_campaign
 from tirelib.campaign.write import write_campaign
 from tirelib.cli import main, program
-from tirelib.parameters import read_tire
+from tirelib.core.arrays import FloatArray
+from tirelib.core.parameters import read_tire
 from tirelib.rig.campaign import run_plan
 from tirelib.rig.plans import Plan
 from tirelib.rig.solve import inflated

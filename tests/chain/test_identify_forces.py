@@ -20,10 +20,10 @@ from tirelib.campaign import (
     write_campaign,
 )
 from tirelib.cli import program
+from tirelib.core.parameters import read_tire, write_tire
 from tirelib.identify.brush_model import brush_of
 from tirelib.identify.force_data import force_data
 from tirelib.identify.ring_patch import half_lengths
-from tirelib.parameters import read_tire, write_tire
 
 TIRE = read_tire("table-6-1").tire
 C_PY, MU = 9e6, 0.92

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 import tirelib
 from tests.unit.force_campaigns import steady_runs, write_forces
 from tirelib.cli import program
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 
 def document(*words: object) -> dict[str, object]:

@@ -17,9 +17,9 @@ from tests.chain.test_diagnose import Folder
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
 from tirelib import waveforms
 from tirelib.cli import program
+from tirelib.core.errors import TirelibError
+from tirelib.core.parameters import write_tire
 from tirelib.effects import CATALOGUE
-from tirelib.errors import TirelibError
-from tirelib.parameters import write_tire
 from tirelib.waveforms import Waveforms
 
 

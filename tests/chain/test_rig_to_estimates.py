@@ -13,10 +13,10 @@ import pytest
 
 from tirelib.campaign import read_campaign
 from tirelib.cli.limits import outside
+from tirelib.core.flags import TurnFlag
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained, take, train
-from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, observe
 from tirelib.rig.campaign import run_plan
 from tirelib.rig.plans import Plan

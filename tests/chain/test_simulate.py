@@ -17,8 +17,8 @@ from tests.chain.test_command_line import run
 from tests.unit.diagnose.planted import model_file, waves
 from tirelib.cli import main, program
 from tirelib.compare.model import model_of, predict_runs
+from tirelib.core.parameters import read_tire, write_tire
 from tirelib.model.base import operating_points
-from tirelib.parameters import read_tire, write_tire
 
 
 def document(tmp_path: Path, *words: object) -> dict[str, Any]:

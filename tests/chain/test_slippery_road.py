@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from tirelib.arrays import FloatArray
 from tirelib.campaign import CampaignHeader, TireGeometry
+from tirelib.core.arrays import FloatArray
 from tirelib.estimators.calibrate import calibrate_chain
 from tirelib.estimators.calibration import LARGEST_ANGLE_STD
 from tirelib.estimators.chain import Chain

@@ -16,7 +16,7 @@ from continuum.tire import Condition, draw
 
 from tests.continuum.rolling import COARSE, COND, TIRE, plain, state
 from tirelib.campaign import read_campaign
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 RUN = Run(COND, 0.5, 1.0, 60.0, 2.5e5)
 

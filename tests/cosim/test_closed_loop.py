@@ -16,7 +16,7 @@ from cosim.wheels import FourWheels
 from scipy.integrate import cumulative_trapezoid
 
 from tests.cosim import fmus
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.core.errors import ConvergenceError, ParameterError
 
 OMEGA = np.array([60.0, 70.0, 80.0, 90.0])
 CONTROL = SlipController()

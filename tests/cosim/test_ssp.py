@@ -16,7 +16,7 @@ from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from tests.cosim import fmus
 from tests.fmu import live
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 STEPS = 85
 """170 ms at 90 km/h: every wheel's second contact."""

@@ -12,7 +12,7 @@ from cosim.recording import VEHICLE, drive
 from cosim.vehicle import Controls, G, Motion, Vehicle
 from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
 
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.fmu.virtual.coordinates import INPUTS
 from tirelib.fmu.virtual.spec import friction_surface
 from tirelib.fmu.virtual.surface import read_surface

@@ -17,7 +17,7 @@ from fmpy.validation import validate_fmu
 
 from tests.cosim import fmus
 from tests.fmu import live
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 
 @pytest.fixture(scope="module")

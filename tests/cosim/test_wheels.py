@@ -21,9 +21,9 @@ from cosim.wheels import NAMES, OWN_FRICTION, WHEELS, FourWheels, WheelStates
 from pages.cosim import write_cosim
 
 from tests.fmu import live, virtual_host
-from tirelib.errors import ParameterError
-from tirelib.flags import TurnFlag
-from tirelib.held import HELD
+from tirelib.core.errors import ParameterError
+from tirelib.core.flags import TurnFlag
+from tirelib.core.held import HELD
 
 
 def _steer(side: float) -> Manoeuvre:

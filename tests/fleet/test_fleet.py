@@ -21,7 +21,7 @@ from distributed import Client
 from tests.fleet.recordings import describe, write_drive
 from tirelib.cli import program
 from tirelib.cli.fleet import run_verb
-from tirelib.errors import FormatError, ParameterError
+from tirelib.core.errors import FormatError, ParameterError
 from tirelib.fleet import dataset, engine, work
 from tirelib.fleet.dataset import DataSet, now
 from tirelib.fleet.engine import Counts

@@ -22,7 +22,7 @@ from distributed.core import Status
 
 from tests.synthetic import synthetic_run, write
 from tirelib.cli.fleet import run_verb
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.fleet import cluster, engine
 from tirelib.fleet.dataset import DataSet
 from tirelib.fleet.engine import Counts, SchedulerLostError

@@ -12,7 +12,7 @@ from tests.fleet.recordings import describe, write_drive
 from tirelib.campaign import recording as module
 from tirelib.campaign.recording import blocks, read_recording
 from tirelib.cli import program
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.continuous import estimate_recording
 from tirelib.features.extract import extract_features

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from tests.fmu import live
+from tirelib.core.held import HELD
 from tirelib.fmu.run import LoadedFmu
-from tirelib.held import HELD
 
 
 def held(**known: float) -> np.ndarray:

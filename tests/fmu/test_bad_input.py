@@ -15,8 +15,8 @@ from fmpy.fmi1 import FMICallException
 from tests.fmu import live
 from tests.fmu.player import held
 from tests.synthetic import LATERAL
-from tirelib.errors import FormatError
-from tirelib.flags import TurnFlag
+from tirelib.core.errors import FormatError
+from tirelib.core.flags import TurnFlag
 from tirelib.fmu import export
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.run import LoadedFmu

@@ -11,10 +11,10 @@ from fmpy.fmi1 import FMICallException
 
 from tests.fmu import live
 from tests.fmu.player import CONDITIONS, held, play, play_from_start, same, strain
-from tirelib.errors import FormatError
-from tirelib.flags import TurnFlag, flag_names
+from tirelib.core.errors import FormatError
+from tirelib.core.flags import TurnFlag, flag_names
+from tirelib.core.held import HELD
 from tirelib.fmu.run import LoadedFmu
-from tirelib.held import HELD
 from tirelib.stream import StreamEstimator
 
 QUANTITIES = ("Fz", "alpha", "kappa", "Fy")

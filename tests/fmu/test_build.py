@@ -16,14 +16,14 @@ from fmpy.validation import validate_fmu
 
 from tests.fmu import live, virtual_host
 from tests.fmu.player import CONDITIONS
-from tirelib.errors import FormatError, ParameterError
-from tirelib.flags import TurnFlag
+from tirelib.core.errors import FormatError, ParameterError
+from tirelib.core.flags import TurnFlag
+from tirelib.core.units import TABLE
 from tirelib.fmu.build import build_fmu, embedded_calibration
 from tirelib.fmu.bundle import collect, content_hash, renamed
 from tirelib.fmu.parts import source_file
 from tirelib.fmu.run import LoadedFmu
 from tirelib.stream.estimator import RATES
-from tirelib.units import TABLE
 
 GIVEN = {
     "1": "ratio",
@@ -234,7 +234,7 @@ def test_the_bundle_is_named_by_its_content_and_holds_the_core_only() -> None:
     assert "stream/estimator.py" in sources
     for absent in ("features/table.py", "observations.py", "estimators/fit.py", "cli/fmu.py"):
         assert absent not in sources
-    changed = {**sources, "flags.py": sources["flags.py"] + "\n"}
+    changed = {**sources, "core/flags.py": sources["core/flags.py"] + "\n"}
     assert content_hash(changed) != content_hash(sources)
     with zipfile.ZipFile(live.fmu_file(10, python=True)) as archive:
         names = archive.namelist()
@@ -251,9 +251,9 @@ def test_a_module_that_needs_more_than_numpy_and_scipy_is_refused(tmp_path: Path
 
 
 def test_only_imports_of_the_library_are_renamed() -> None:
-    source = "from tirelib.flags import x\nimport tirelib.axes\nname = 'tirelib.flags'\n"
+    source = "from tirelib.core import x\nimport tirelib.core.axes\nname = 'tirelib.core.axes'\n"
     assert renamed(source, "t_1") == (
-        "from t_1.flags import x\nimport t_1.axes\nname = 'tirelib.flags'\n"
+        "from t_1.core import x\nimport t_1.core.axes\nname = 'tirelib.core.axes'\n"
     )
 
 

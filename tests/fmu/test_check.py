@@ -14,7 +14,7 @@ from pythonfmu import FmuBuilder
 
 from tests.fmu import live
 from tirelib.cli.fmu import fmu as command
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.fmu import check as checking
 from tirelib.fmu.check import check_fmu
 

@@ -12,6 +12,7 @@ from tests.fmu.virtual_host import RATE, surface
 from tests.synthetic import waveform
 from tirelib.campaign import CampaignHeader, Run, RunPlan, TireGeometry, write_campaign
 from tirelib.campaign.read import read_campaign
+from tirelib.core.held import HELD
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.train import train
@@ -19,7 +20,6 @@ from tirelib.features.extract import Features, extract_features
 from tirelib.fmu.run import LoadedFmu
 from tirelib.fmu.virtual.options import Options
 from tirelib.fmu.virtual.wheel import VirtualWheel
-from tirelib.held import HELD
 from tirelib.observations import observe
 from tirelib.signal import LowPass, cut_turns
 from tirelib.stream import StreamEstimator

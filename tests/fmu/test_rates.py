@@ -12,9 +12,9 @@ from fmpy.fmi1 import FMICallException
 from tests.fmu import live, player
 from tests.synthetic import frames as cut
 from tests.synthetic import record
-from tirelib.flags import TurnFlag
+from tirelib.core.flags import TurnFlag
+from tirelib.core.held import HELD
 from tirelib.fmu.run import LoadedFmu
-from tirelib.held import HELD
 
 RATE = 1e4
 CONDITIONS = player.CONDITIONS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.fmu import live
-from tirelib.flags import TurnFlag
+from tirelib.core.flags import TurnFlag
 from tirelib.fmu.reference import Reference
 from tirelib.fmu.strain_reference import strain_reference
 

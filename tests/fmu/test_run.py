@@ -15,7 +15,7 @@ from tests.fmu import live
 from tirelib.campaign import Run, read_campaign, write_campaign
 from tirelib.cli.estimate import estimate
 from tirelib.cli.fmu import fmu
-from tirelib.errors import CalibrationError, FormatError
+from tirelib.core.errors import CalibrationError, FormatError
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.run import LoadedFmu, play_campaign
 

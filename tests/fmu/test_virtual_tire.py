@@ -22,7 +22,7 @@ from tests.fmu.virtual_host import (
     hold_mirrored,
     surface,
 )
-from tirelib.errors import FormatError, ParameterError
+from tirelib.core.errors import FormatError, ParameterError
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.check import check_fmu
 from tirelib.fmu.virtual.coordinates import INPUTS

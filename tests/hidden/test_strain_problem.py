@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hidden.cases import load_case
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.effects import CATALOGUE
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated

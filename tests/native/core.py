@@ -11,9 +11,9 @@ import native_fmu
 import numpy as np
 import pytest
 
-from tirelib.core import FEATURE_ROWS, TURN_SCALARS, FeatureStruct, TurnStruct, columns_of
+from tirelib.core.compiled import FEATURE_ROWS, TURN_SCALARS, FeatureStruct, TurnStruct, columns_of
+from tirelib.core.held import HELD
 from tirelib.features.extract import Features
-from tirelib.held import HELD
 from tirelib.signal import LowPass, Turn
 from tirelib.signal.compiled import low_pass_struct
 from tirelib.signal.turns import PHI

@@ -5,7 +5,7 @@ import ctypes as c
 import numpy as np
 
 from tests.native.core import BY_GAGE, SCALARS, NativeFeatures, NativeTurn
-from tirelib.core import EstimateStruct
+from tirelib.core.compiled import EstimateStruct
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.compiled import NOTES, ROLLING
 from tirelib.estimators.core_table import flat_table

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-import tirelib.core
+import tirelib.core.compiled
 from tests.fmu import live
 from tests.native.test_native_wheel import KINDS, spoilt
 from tests.synthetic import LATERAL, frames
-from tirelib.core import Core, loaded_core
-from tirelib.errors import FormatError, ParameterError, ShapeError
+from tirelib.core.compiled import Core, loaded_core
+from tirelib.core.errors import FormatError, ParameterError, ShapeError
+from tirelib.core.held import HELD
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.compiled import core_calibration
 from tirelib.features import (
@@ -26,7 +27,6 @@ from tirelib.features import (
     features_of_record,
 )
 from tirelib.features.extract import reference_features
-from tirelib.held import HELD
 from tirelib.signal import TurnCutter, Turns, cut_turns, stack_turns
 from tirelib.stream import StreamEstimator
 from tirelib.stream.compiled import CompiledEstimator
@@ -218,7 +218,7 @@ def test_a_library_that_is_damaged_or_of_another_version_leaves_the_work_to_nump
 ) -> None:
     damaged = tmp_path / "core.so"
     damaged.write_bytes(b"\x7fELF nothing else")
-    monkeypatch.setattr(tirelib.core, "shipped", lambda name: damaged)
+    monkeypatch.setattr(tirelib.core.compiled, "shipped", lambda name: damaged)
     loaded_core.cache_clear()
     with pytest.warns(UserWarning, match="the compiled core cannot be loaded"):
         assert loaded_core() is None

@@ -15,7 +15,7 @@ from fmpy.validation import validate_fmu
 from tests.fmu import live
 from tests.fmu.player import play, strain
 from tirelib.cli.fmu import fmu as command
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.fmu.build import embedded_calibration
 from tirelib.fmu.check import check_fmu

@@ -11,7 +11,8 @@ from tests.native.core import SOURCE, NativeCutter
 from tests.native.estimates import NativeCalibration, assert_same_estimates
 from tests.synthetic import LATERAL, synthetic_run, write
 from tirelib.campaign import read_campaign
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
+from tirelib.core.flags import TurnFlag
 from tirelib.estimators import core_table
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.chain import Chain
@@ -21,7 +22,6 @@ from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import Road
 from tirelib.features import Features
 from tirelib.features.extract import reference_features
-from tirelib.flags import TurnFlag
 from tirelib.observations import observe
 from tirelib.signal import TurnCutter, stack_turns
 

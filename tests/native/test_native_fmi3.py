@@ -25,7 +25,7 @@ from tirebench.errors import FmuError
 from tirebench.estimator.fmu_archive import read_fmu
 from tirebench.estimator.fmu_model import FmuFile
 from tirelib.cli.fmu import fmu as command
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.check import check_fmu
 from tirelib.fmu.native import PLATFORMS, core_file

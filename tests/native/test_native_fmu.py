@@ -17,12 +17,12 @@ from fmpy.fmi2 import FMU2Slave, fmi2CoSimulation, fmi2ModelExchange
 from fmpy.validation import validate_fmu
 
 from tests.fmu import live
+from tirelib.core.held import HELD
 from tirelib.estimators.core_table import flat_table
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.native import BINARIES, core_file, resource_file
 from tirelib.fmu.run import keeping
 from tirelib.fmu.wheel import Wheel
-from tirelib.held import HELD
 
 ROOT = Path(__file__).parents[2]
 GATE = "gate/linux64.so"

@@ -13,7 +13,7 @@ from fmpy import extract, read_model_description
 from tests.fmu import live
 from tests.native.core import SOURCE
 from tests.synthetic import LATERAL
-from tirelib.held import HELD
+from tirelib.core.held import HELD
 
 HOST = Path(__file__).with_name("threads.c")
 THREADS, SAMPLES = 4, 10

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from tests.native.core import CoreError, NativeCutter, assert_same_features, assert_same_turn
 from tests.synthetic import LATERAL, RATE, record, waveform
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
+from tirelib.core.flags import TurnFlag
 from tirelib.features.extract import reference_features
-from tirelib.flags import TurnFlag
 from tirelib.signal import LowPass, TurnCutter, stack_turns
 
 SEQUENCES = int(os.environ.get("TIRELIB_SEQUENCES", "100"))

@@ -10,11 +10,11 @@ import pytest
 from tests.fmu import live
 from tests.native.wheels import AXES, REASONS, NativeWheel
 from tests.synthetic import record
+from tirelib.core.flags import TurnFlag
+from tirelib.core.held import HELD
 from tirelib.estimators.calibration import Calibration
-from tirelib.flags import TurnFlag
 from tirelib.fmu.refusals import StepError
 from tirelib.fmu.wheel import Wheel
-from tirelib.held import HELD
 
 TURN = int(2.0 * np.pi * live.RADIUS / live.SPEED * live.RATE)
 

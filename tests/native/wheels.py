@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.core import OutputStruct
+from tirelib.core.compiled import OutputStruct
+from tirelib.core.flags import flag_names
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.compiled import NOTES, ROLLING
 from tirelib.estimators.core_table import flat_table
-from tirelib.flags import flag_names
 
 AXES = ("iso", "sae", "adapted_sae")
 REASONS = {-1: "whole number", -2: "longest turn", -3: "samples = ", -4: "fault"}

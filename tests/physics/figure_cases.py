@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from ring_figures import cases
 
-from tirelib.arrays import FloatArray
-from tirelib.parameters import Tire, read_tire
+from tirelib.core.arrays import FloatArray
+from tirelib.core.parameters import Tire, read_tire
 from tirelib.report.simulation import Simulation
 
 ROLLING, TEST = "table-6-1", "table-6-2-195-65r15"

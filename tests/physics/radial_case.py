@@ -8,7 +8,7 @@ from scipy.optimize import nnls
 
 from tirelib.contact.radial import RadialContact, press
 from tirelib.contact.tread import Tread
-from tirelib.parameters import Tire, read_tire
+from tirelib.core.parameters import Tire, read_tire
 from tirelib.ring.compliance import Compliance, compliance
 from tirelib.ring.ring import Ring, plain_stiffness
 

@@ -10,8 +10,8 @@ from tirelib.contact import exact, radial
 from tirelib.contact import exact_energy as energy
 from tirelib.contact.exact import load_exact
 from tirelib.contact.tread import Tread
-from tirelib.errors import ConvergenceError, ParameterError
-from tirelib.parameters import read_tire
+from tirelib.core.errors import ConvergenceError, ParameterError
+from tirelib.core.parameters import read_tire
 from tirelib.ring.compliance import compliance
 from tirelib.ring.ring import Ring
 

@@ -9,10 +9,11 @@ import pytest
 
 from tirelib.campaign import read_campaign
 from tirelib.contact.strips import RoadForces, StripContact, press_strips
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.core.errors import ParameterError, ShapeError
+from tirelib.core.parameters import Tire
+from tirelib.core.traces import StrainTrace
 from tirelib.features.extract import Features, extract_features
 from tirelib.observations import measure_run
-from tirelib.parameters import Tire
 from tirelib.rig.observe import forces
 from tirelib.rig.observe import trace as rig_trace
 from tirelib.rig.solve import State, solve
@@ -22,7 +23,6 @@ from tirelib.signal.lowpass import smooth_to_angle
 from tirelib.signal.turns import Turns
 from tirelib.strain.gages import gage_harmonics, gage_trace
 from tirelib.strain.innerliner import strain_harmonics
-from tirelib.traces import StrainTrace
 
 TIRE = Tire(
     ring_radius=0.3035,

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.linalg import circulant, eigh
 from scipy.stats import binom
 
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.ring.frequencies import (
     belt_mass,
     natural_frequency,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.ring.green import (
     modal_response,
     point_response,

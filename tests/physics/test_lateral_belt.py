@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirelib.contact.fourier import evaluate
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.ring.lateral import BeamConstants, LateralBelt, LateralDeflection, bend_belt
 from tirelib.ring.lateral import infinite_beam as infinite
 

@@ -9,7 +9,7 @@ from tests.physics.radial_case import TIRE, TREAD, contacts, on_a_grid, printed_
 from tirelib.contact.fourier import evaluate
 from tirelib.contact.free_boundary import Start
 from tirelib.contact.radial import RadialContact, fit_edges, load, press
-from tirelib.parameters import Tire
+from tirelib.core.parameters import Tire
 
 ANCHORS = [  # d0 [mm], Omega, lambda, lead, trail [rad], Fz [N], q centre, q max [N/m], centre [mm]
     (25, 0, 0.0, 0.2380, 0.2380, 5127.5, 40777, 41331, 0.00),

@@ -11,8 +11,8 @@ from tests.physics.radial_case import TIRE, TREAD, on_a_grid, ring
 from tirelib.contact.checks import LARGEST_ANGLE, carried
 from tirelib.contact.radial import RadialContact, fit_edges, load, press
 from tirelib.contact.tread import Tread
-from tirelib.errors import ConvergenceError, ParameterError
-from tirelib.parameters import read_tire
+from tirelib.core.errors import ConvergenceError, ParameterError
+from tirelib.core.parameters import read_tire
 from tirelib.report.simulation import simulate
 from tirelib.ring.compliance import Compliance, compliance
 from tirelib.ring.ring import Ring

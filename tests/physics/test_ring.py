@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.sparse.linalg import spsolve
 
 from tirelib.contact.fourier import evaluate, load_harmonics
-from tirelib.parameters import read_tire
+from tirelib.core.parameters import read_tire
 from tirelib.ring.compliance import compliance
 from tirelib.ring.ring import Ring, plain_stiffness
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.errors import ParameterError
-from tirelib.parameters import read_tire
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import read_tire
 from tirelib.ring.compliance import Compliance, compliance
 from tirelib.ring.ring import Ring, dashpots, modal_stiffness
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.exact import load_exact
 from tirelib.contact.tread import Tread
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.ring.ring import Ring
 from tirelib.rolling import belt, road
 from tirelib.rolling.assemble import Unknowns, changed, matrix, residual

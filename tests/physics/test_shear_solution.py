@@ -23,7 +23,7 @@ from tirelib.contact import radial, shear
 from tirelib.contact.shear import Shear, ShearContact
 from tirelib.contact.shear_law import Elements
 from tirelib.contact.tread import Tread
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.ring.compliance import Compliance, compliance
 
 # friction

@@ -14,7 +14,7 @@ from tirelib.contact.static import (
     press_to_load,
     road_gap,
 )
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.ring.green import point_response_series, pressed_shape
 
 TIRE = StaticTire(

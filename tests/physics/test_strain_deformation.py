@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirelib.contact.static import StaticTire, press_to_deflection, road_gap
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.ring.green import pressed_shape
 from tirelib.strain.deformation import (
     arc_condition,

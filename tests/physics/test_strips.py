@@ -11,8 +11,8 @@ from tirelib.contact.load_transfer import roll_load, strip_deflection
 from tirelib.contact.radial import load
 from tirelib.contact.strips import SHARED, Layout, RoadForces, StripContact, press_strips
 from tirelib.contact.tread import Tread
-from tirelib.errors import ParameterError
-from tirelib.parameters import Tire
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import Tire
 from tirelib.rig.observe import edges, forces
 from tirelib.rig.solve import State, solve
 from tirelib.rig.tire import Condition, RigTire

@@ -5,8 +5,8 @@ import pytest
 
 from tirelib.contact.fourier import evaluate
 from tirelib.contact.strips import Layout, StripContact, press_strips
-from tirelib.errors import ParameterError, ShapeError
-from tirelib.parameters import Tire
+from tirelib.core.errors import ParameterError, ShapeError
+from tirelib.core.parameters import Tire
 from tirelib.strain.gages import gage_trace
 from tirelib.strain.tread_traction import TreadBeam, outward_shear, tread_strain
 

@@ -5,13 +5,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from routes.damped_ring import Law, damped_waveform
 
-from tirelib.arrays import FloatArray
 from tirelib.campaign import CampaignHeader, Tolerance
 from tirelib.campaign.model import TireGeometry
+from tirelib.core.arrays import FloatArray
+from tirelib.core.parameters import Number, Tire, TireFile, read_tire
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.model.base import operating_points, predict, values_of
 from tirelib.model.solution import solved
-from tirelib.parameters import Number, Tire, TireFile, read_tire
 from tirelib.signal import LowPass
 from tirelib.waveforms import CONDITIONS, Waveforms
 

@@ -22,7 +22,7 @@ from tests.routes.route_campaign import (
     waves,
 )
 from tirelib.campaign import read_campaign
-from tirelib.errors import CalibrationError, ParameterError
+from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import start_file
 from tirelib.model.base import operating_points, values_of

@@ -16,7 +16,7 @@ from routes.edges import (
 )
 
 from tests.routes.route_campaign import SERIES, tire, turned, waves
-from tirelib.errors import CalibrationError, ShapeError
+from tirelib.core.errors import CalibrationError, ShapeError
 from tirelib.model.base import operating_points, values_of
 
 LOADS = np.array([1700.0, 3400.0, 5100.0, 6800.0])

@@ -10,9 +10,9 @@ from routes.static_route_fit import Parameter, Quantity, fit_few, profile
 from routes.static_route_problem import StrainProblem
 
 from tests.routes.route_campaign import SERIES, runs, tire, tire_file
-from tirelib.arrays import FloatArray
 from tirelib.contact.static import StaticTire, press_to_load
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.model.base import operating_points, smoothed
 from tirelib.ring.green import modal_response, pressed_shape

@@ -19,7 +19,7 @@ from scipy.optimize import fsolve
 from tirelib.contact import shear
 from tirelib.contact.radial import load, press
 from tirelib.contact.tread import Tread
-from tirelib.parameters import Tire, read_tire
+from tirelib.core.parameters import Tire, read_tire
 from tirelib.ring.compliance import Compliance, compliance
 from tirelib.ring.ring import Ring, plain_stiffness
 

@@ -7,11 +7,11 @@ from force_tires.families import FAMILIES, Changes, Setting
 from force_tires.learn import FIRST, OUT, families_sha256
 from force_tires.plans import case
 
+from tirelib.core.threads import one_thread
 from tirelib.infer.hypothesis import judged
 from tirelib.infer.null import OWN
 from tirelib.infer.plain import Family, load
 from tirelib.infer.posterior import posterior
-from tirelib.threads import one_thread
 
 
 def at_angles(angles: np.ndarray, load: float, ratio: float = 0.0) -> tuple[Setting, Changes]:

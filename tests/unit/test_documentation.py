@@ -17,7 +17,7 @@ from click.testing import CliRunner
 from tests.schema_check import SCHEMAS, wrong_documents
 from tirebench.cli import program as bench
 from tirelib.cli import program
-from tirelib.flags import TurnFlag
+from tirelib.core.flags import TurnFlag
 from tirelib.model.brush import BrushConditions, BrushState
 from tirelib.model.state import Operating, State
 

@@ -7,8 +7,8 @@ import pytest
 
 from tirelib.campaign.mdf import read_mdf
 from tirelib.campaign.problem import Problem, raise_errors
-from tirelib.errors import Fault, FormatError, ParameterError, TirelibError
-from tirelib.units import to_si
+from tirelib.core.errors import Fault, FormatError, ParameterError, TirelibError
+from tirelib.core.units import to_si
 
 HERE = Fault("M.toml, ring.mass", "-1 kg", "a mass is above 0", "correct it")
 THERE = Fault("", "no unit; at all", "allowed are m", "add it")

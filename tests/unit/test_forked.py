@@ -8,15 +8,15 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tirelib.errors import ConvergenceError, ParameterError
-from tirelib.forked import forked
+from tirelib.core.errors import ConvergenceError, ParameterError
+from tirelib.core.forked import forked
 
 COUNT = 5
 
 
 @pytest.fixture(params=[1, 2])
 def processors(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
-    monkeypatch.setattr("tirelib.forked._processors", lambda: request.param)
+    monkeypatch.setattr("tirelib.core.forked._processors", lambda: request.param)
     return int(request.param)
 
 
@@ -26,7 +26,7 @@ def test_results_come_in_the_order_of_the_calls(processors: int) -> None:
 
 
 def test_a_long_call_does_not_keep_the_others_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tirelib.forked._processors", lambda: 2)
+    monkeypatch.setattr("tirelib.core.forked._processors", lambda: 2)
     back, out = os.pipe()
 
     def first() -> int:

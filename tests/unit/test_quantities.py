@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tirelib.quantities import QUANTITIES, Quantity
-from tirelib.units import TABLE
+from tirelib.core.quantities import QUANTITIES, Quantity
+from tirelib.core.units import TABLE
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES.values(), ids=list(QUANTITIES))

@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from tests.fmu import live, virtual_host
 from tirelib.campaign import read_campaign
 from tirelib.compare.compare import compare
+from tirelib.core.threads import VARIABLES, one_thread
 from tirelib.diagnose.diagnose import diagnose
 from tirelib.diagnose.forces.diagnose import diagnose_force
 from tirelib.estimators.chain import Chain
@@ -29,7 +30,6 @@ from tirelib.planning.next_test import next_test
 from tirelib.planning.selftest import selftest
 from tirelib.report.simulation import simulate
 from tirelib.rig.solve import solve
-from tirelib.threads import VARIABLES, one_thread
 
 ROOT = Path(__file__).parents[2]
 assert scipy.linalg  # its library is loaded

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.errors import UnitError
-from tirelib.units import (
+from tirelib.core.errors import UnitError
+from tirelib.core.units import (
     DIMENSIONS,
     TABLE,
     UnitRow,

@@ -8,7 +8,7 @@ import pytest
 
 from tests.synthetic import synthetic_run, waveform, write
 from tirelib.campaign import read_campaign
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID, N_PHI, Waveforms, measure_waveforms
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.contact.profiles import PressureProfile
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 
 MOST_STEPS = 80
 

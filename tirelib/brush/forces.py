@@ -21,11 +21,11 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.brush.contact_split import Grid, make_grid, split
 from tirelib.brush.parameters import BrushParameters
 from tirelib.contact.profiles import PressureProfile
-from tirelib.errors import ConvergenceError, ParameterError, ShapeError
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import ConvergenceError, ParameterError, ShapeError
 
 MOST_ITERATIONS = 60
 MOST_HALVINGS = 8

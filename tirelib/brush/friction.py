@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import ParameterError
 
 MOST_STD = 0.25
 """Largest relative standard deviation of an estimate that is still called one."""

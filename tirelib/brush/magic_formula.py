@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import OptimizeResult, least_squares
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 
 NAMES = ("C_alpha", "D", "C", "E", "S_h", "S_v")
 LOWEST = MappingProxyType({"C": 1.0, "E": -20.0})
@@ -259,6 +259,6 @@ def _check(
     if not slope < 0.0:
         raise ParameterError(
             "Fy grows with the slip angle; in ISO 8855 a positive slip angle gives a negative "
-            "force; convert the axes (tirelib.axes)"
+            "force; convert the axes (tirelib.core.axes)"
         )
     return -float(slope)

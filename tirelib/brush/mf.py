@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import BoolArray, FloatArray
 from tirelib.brush.magic_formula import magic_angle, sine_curve
 from tirelib.brush.mf_tire import Coefficients, Inputs, MagicForces, MagicTire, check_inputs
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import ParameterError
 
 FIVE, SIX = (5, 6, 52), (60, 61, 62)
 """Fit types of the two versions."""

@@ -11,7 +11,7 @@ from tirelib import __version__
 from tirelib.brush.mf_fit import MagicFit
 from tirelib.brush.mf_tire import LIMITS
 from tirelib.brush.tir import TirEntry, TirFile, TirLine, TirSection
-from tirelib.units import from_si
+from tirelib.core.units import from_si
 
 UNITS = {
     "LENGTH": "meter",

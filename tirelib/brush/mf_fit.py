@@ -13,10 +13,10 @@ from types import MappingProxyType
 import numpy as np
 from scipy.optimize import least_squares
 
-from tirelib.arrays import BoolArray, FloatArray
 from tirelib.brush.mf import magic_forces
 from tirelib.brush.mf_tire import Coefficients, MagicTire
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import CalibrationError
 
 PURE_RATIO, PURE_ANGLE = 0.005, float(np.deg2rad(0.25))
 """Slip ratio and slip angle [rad] up to which the other slip counts as none: there a force of the

@@ -8,9 +8,9 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import BoolArray, FloatArray
 from tirelib.brush.tir import TirFile
-from tirelib.errors import FormatError, ParameterError, ShapeError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import FormatError, ParameterError, ShapeError
 
 REQUIRED = ("PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
 """Without these there is no curve at all; every other absent coefficient is neutral."""

@@ -12,8 +12,8 @@ it; (8) multiplies by the bracket where it must divide.
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 
 
 def bristle_stiffness(cornering_stiffness: npt.ArrayLike, half_length: npt.ArrayLike) -> FloatArray:

@@ -18,8 +18,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ConvergenceError, ParameterError, ShapeError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError, ParameterError, ShapeError
 
 MOST_ITERATIONS = 40
 TOLERANCE = 1e-10

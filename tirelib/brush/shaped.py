@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import FloatArray
 from tirelib.brush.predict import (
     PointConditions,
     PointForces,
@@ -28,7 +27,8 @@ from tirelib.brush.predict import (
     _Contact,
     predict_forces,
 )
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 
 LOWEST, HIGHEST = -0.9, 2.9
 """Allowed flatness: beyond -1 the pressure is negative, from 3 on sticking has no single end."""

@@ -7,7 +7,7 @@ dimensions, loads, pressures, speeds, ranges and structural data have.
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from tirelib.units import to_si
+from tirelib.core.units import to_si
 
 BASES = ("length", "force", "angle", "mass", "time", "pressure")
 

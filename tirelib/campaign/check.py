@@ -25,7 +25,7 @@ from tirelib.campaign.mdf import read_mdf
 from tirelib.campaign.model import CampaignHeader, Run, RunPlan
 from tirelib.campaign.problem import Problem, errors_of
 from tirelib.campaign.runfile import inspect_run
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 Progress = Callable[[int, int], None]
 

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from tirelib.campaign.finding import RunFinding, finding
 from tirelib.campaign.model import BoolArray, CampaignHeader, FloatArray, Run
 from tirelib.campaign.turns import turn_samples, turn_stack
-from tirelib.units import from_si
+from tirelib.core.units import from_si
 
 PLAUSIBLE_STRAIN = (2e-4, 0.1)
 """Peak-to-peak strain of a turn that a rolling, loaded tire may have."""

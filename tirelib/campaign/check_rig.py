@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tirelib.axes import sign
 from tirelib.campaign.check_gages import not_finite
 from tirelib.campaign.finding import RunFinding, finding
 from tirelib.campaign.model import CampaignHeader, Run
 from tirelib.campaign.write import FIELD_UNITS
-from tirelib.units import dimension_of, from_si
+from tirelib.core.axes import sign
+from tirelib.core.units import dimension_of, from_si
 
 
 class _SetPoint(NamedTuple):

@@ -8,9 +8,9 @@ for it: the two may differ.
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.campaign.model import Run
-from tirelib.held import HELD
+from tirelib.core.arrays import FloatArray
+from tirelib.core.held import HELD
 
 LONGEST_HOLD = 3.0
 """Rig samples after which the last one is no longer held: itself, one that is lost and one of

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tirelib.axes import FLIPPED, sign
 from tirelib.campaign.model import CampaignHeader, TireGeometry, Tolerance
 from tirelib.campaign.problem import Problem, errors_of
-from tirelib.units import dimensions_of_unit, units_of
+from tirelib.core.axes import FLIPPED, sign
+from tirelib.core.units import dimensions_of_unit, units_of
 
 FORMAT = "tirelib-campaign/1"
 FILE = "campaign.toml"

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.errors import Fault, FormatError
+from tirelib.core.errors import Fault, FormatError
 
 _MAGIC = b"MDF     "
 _UNFINISHED = b"UnFinMF "

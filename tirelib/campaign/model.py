@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.errors import ShapeError
+from tirelib.core.errors import ShapeError
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -128,7 +128,7 @@ class Run:
         A quantity that was not recorded is absent.
     rig_time : array, shape (n_rig,), or None, [s]
     dimensions : mapping of name to dimension
-        For channels of `rig` whose name says nothing of their dimension (`tirelib.units`).
+        For channels of `rig` whose name says nothing of their dimension (`tirelib.core.units`).
     """
 
     plan: RunPlan

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from tirelib.campaign.model import CampaignHeader, Run, RunPlan
 from tirelib.campaign.plan import SET_POINTS
-from tirelib.units import from_si
+from tirelib.core.units import from_si
 
 
 class Quantity(NamedTuple):

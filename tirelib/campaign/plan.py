@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
-from tirelib.axes import sign
 from tirelib.campaign.model import KINDS, RunPlan
 from tirelib.campaign.problem import Problem
-from tirelib.units import from_si, to_si
+from tirelib.core.axes import sign
+from tirelib.core.units import from_si, to_si
 
 FILE = "runs.csv"
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from tirelib.errors import Fault, FormatError
+from tirelib.core.errors import Fault, FormatError
 
 Severity = Literal["error", "warning"]
 

@@ -10,7 +10,7 @@ from tirelib.campaign import plan as plan_file
 from tirelib.campaign.model import CampaignHeader, Run, RunPlan
 from tirelib.campaign.problem import raise_errors
 from tirelib.campaign.runfile import load_run
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 
 @dataclass(frozen=True, slots=True)

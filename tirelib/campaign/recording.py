@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.axes import FLIPPED, sign
 from tirelib.campaign.conditions import LONGEST_HOLD
 from tirelib.campaign.mdf import Channel, MdfFile, Place
 from tirelib.campaign.model import CLOCK_TOLERANCE, BoolArray, FloatArray
 from tirelib.campaign.problem import Problem, raise_errors
 from tirelib.campaign.timebase import STEP_TOLERANCE
-from tirelib.errors import Fault, FormatError, UnitError
-from tirelib.held import HELD
-from tirelib.units import dimension_of, to_si
+from tirelib.core.axes import FLIPPED, sign
+from tirelib.core.errors import Fault, FormatError, UnitError
+from tirelib.core.held import HELD
+from tirelib.core.units import dimension_of, to_si
 
 FORMAT = "tirelib-recording/1"
 FILE = "recording.toml"
@@ -58,7 +58,7 @@ class Wheel:
     trigger : str
         Name of the trigger's channel; empty if there is none.
     conditions : mapping of name to Held
-        By the names of `tirelib.held.HELD`.
+        By the names of `tirelib.core.held.HELD`.
     """
 
     name: str

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from tirelib.axes import sign
 from tirelib.campaign.mdf import Channel, Group, read_mdf
 from tirelib.campaign.model import CampaignHeader, FloatArray, Run, RunPlan
 from tirelib.campaign.problem import Problem, raise_errors
 from tirelib.campaign.timebase import gage_time_problems, rig_time_problems
-from tirelib.errors import FormatError, UnitError
-from tirelib.units import dimension_of, dimensions_of_unit, to_si
+from tirelib.core.axes import sign
+from tirelib.core.errors import FormatError, UnitError
+from tirelib.core.units import dimension_of, dimensions_of_unit, to_si
 
 _STRAIN = re.compile(r"strain_([1-9]\d*)")
 _TRIGGER = "trigger"
@@ -228,7 +228,7 @@ class _RunFile:
             Problem(
                 f"{self.plan.file}, channel {channel.name}",
                 f"its unit {channel.unit!r} is unknown, so the channel is left out",
-                "a unit of tirelib.units is needed",
+                "a unit of tirelib.core.units is needed",
                 "convert it or drop the channel",
                 "warning",
             )

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from tirelib.axes import sign
 from tirelib.campaign import header as header_file
 from tirelib.campaign import plan as plan_file
 from tirelib.campaign.mdf import Channel, Group, write_mdf
 from tirelib.campaign.model import CampaignHeader, FloatArray, Run, RunPlan
-from tirelib.errors import ParameterError, ShapeError
-from tirelib.units import dimension_of, from_si
+from tirelib.core.axes import sign
+from tirelib.core.errors import ParameterError, ShapeError
+from tirelib.core.units import dimension_of, from_si
 
 FIELD_UNITS = {
     "force": "N",

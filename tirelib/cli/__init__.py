@@ -11,8 +11,8 @@ import click
 from click.shell_completion import CompletionItem
 
 from tirelib import __version__
-from tirelib.errors import TirelibError
-from tirelib.threads import bound_process
+from tirelib.core.errors import TirelibError
+from tirelib.core.threads import bound_process
 
 VERBS = {
     "campaign": "Validate a folder of measurements, or show its content.",

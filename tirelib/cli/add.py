@@ -15,11 +15,11 @@ from tirelib.cli.common import (
 )
 from tirelib.cli.options import effects_option, json_option, model_option
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.journey import QUANTITIES
 
 if TYPE_CHECKING:
-    from tirelib.parameters import TireFile
+    from tirelib.core.parameters import TireFile
 
 _EXAMPLE = """\b
 Examples:
@@ -105,9 +105,9 @@ def add(
 
 
 def _undo(model_name: str, out: Path, json_file: Path | None) -> None:
+    from tirelib.core.parameters import read_tire, write_tire
     from tirelib.extend.document import FORMAT as EXTENSION
     from tirelib.extend.model_file import undone_file
-    from tirelib.parameters import read_tire, write_tire
 
     file, entry = undone_file(read_tire(model_name))
     write_tire(file, out, FORMAT)
@@ -140,10 +140,10 @@ def _change(
     report: Path | None,
     json_file: Path | None,
 ) -> None:
+    from tirelib.core.parameters import read_tire
     from tirelib.extend.additions import additions, removal
     from tirelib.extend.extension import known_effect
     from tirelib.model.registration import registered_effects
-    from tirelib.parameters import read_tire
 
     catalogue = registered_effects(effect_files)
     effects = [known_effect(name, catalogue) for name in effect_names]
@@ -169,7 +169,7 @@ def write_step(
     json_file: Path | None,
 ) -> None:
     """Write the model after a step, the step's page and its numbers; say where they are."""
-    from tirelib.parameters import write_tire
+    from tirelib.core.parameters import write_tire
     from tirelib.report.extension import write_extension
 
     write_tire(new, out, FORMAT)

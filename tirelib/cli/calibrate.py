@@ -24,7 +24,7 @@ from tirelib.cli.features import make_low_pass
 from tirelib.cli.limits import not_checked, not_given
 from tirelib.cli.options import json_option, low_pass_options
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.costs import costs_of
 from tirelib.estimators.crossval import (

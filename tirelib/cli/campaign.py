@@ -18,7 +18,7 @@ from tirelib.campaign.read import Campaign, read_campaign
 from tirelib.cli.common import NEW_FILE, NEW_FOLDER
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.errors import CalibrationError, FormatError
+from tirelib.core.errors import CalibrationError, FormatError
 
 CHECK_FORMAT = "tirelib-campaign-check/1"
 SHOW_FORMAT = "tirelib-campaign-show/1"

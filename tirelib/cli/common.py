@@ -9,8 +9,8 @@ from typing import Any
 import click
 from rich.console import Console
 
-from tirelib.documents import plain as plain
-from tirelib.documents import write_json as write_json
+from tirelib.core.documents import plain as plain
+from tirelib.core.documents import write_json as write_json
 
 
 class NewPath(click.Path):

@@ -15,7 +15,7 @@ from tirelib.cli.common import (
 )
 from tirelib.cli.options import effects_option, json_option, model_option, quantity_option
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 if TYPE_CHECKING:
     from tirelib.compare import Comparison, ForceComparison
@@ -79,8 +79,8 @@ def compare(
 ) -> None:
     """Compare a model with CAMPAIGN and show where it fails."""
     from tirelib.compare import compare as compare_model
+    from tirelib.core.parameters import read_tire
     from tirelib.model.registration import registered_effects
-    from tirelib.parameters import read_tire
 
     catalogue = registered_effects(effect_files)
     planted = [_trace(given) for given in traces]

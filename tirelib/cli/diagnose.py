@@ -25,13 +25,13 @@ from tirelib.cli.options import (
     report_option,
 )
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.errors import TirelibError
+from tirelib.core.errors import TirelibError
 
 if TYPE_CHECKING:
+    from tirelib.core.parameters import TireFile
     from tirelib.diagnose.document import Assessment
     from tirelib.diagnose.forces.assess import ForceAssessment
     from tirelib.effects import Effect
-    from tirelib.parameters import TireFile
 
 _EXAMPLE = """\b
 Examples:
@@ -71,8 +71,8 @@ def diagnose(
     json_file: Path | None,
 ) -> None:
     """Tell which physical effect the model lacks in CAMPAIGN."""
+    from tirelib.core.parameters import read_tire
     from tirelib.model.registration import registered_effects
-    from tirelib.parameters import read_tire
 
     catalogue = registered_effects(effect_files)
     file = read_tire(model_name)

@@ -13,7 +13,7 @@ from rich.table import Table
 from tirelib.cli.common import output, write_json
 from tirelib.cli.options import effects_option, json_option
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 if TYPE_CHECKING:
     from tirelib.effects import Effect

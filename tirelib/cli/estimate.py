@@ -22,8 +22,8 @@ from tirelib.cli.common import (
 from tirelib.cli.limits import extrapolated, not_checked, not_given, outside, weakly_checked
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.documents import file_hash
-from tirelib.errors import CalibrationError
+from tirelib.core.documents import file_hash
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.continuous import estimate_recording

@@ -22,14 +22,14 @@ from tirelib.cli.common import (
 )
 from tirelib.cli.options import effects_option, json_option, quantity_option
 from tirelib.cli.progress import chosen_words, progress_bar, progress_options
-from tirelib.errors import CalibrationError, ParameterError, TirelibError
+from tirelib.core.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.journey import QUANTITIES, explains_forces
 
 if TYPE_CHECKING:
+    from tirelib.core.parameters import TireFile
     from tirelib.diagnose.document import Assessment
     from tirelib.diagnose.forces.assess import ForceAssessment
     from tirelib.effects import Effect
-    from tirelib.parameters import TireFile
     from tirelib.report.journey import Journey
 
 FORMAT = "tirelib-explanation/1"
@@ -141,8 +141,8 @@ class Steps:
         TirelibError
             If any verb but `add` fails; a failure of `add` becomes a message.
         """
+        from tirelib.core.parameters import read_tire
         from tirelib.journey import compare
-        from tirelib.parameters import read_tire
         from tirelib.report.journey import Journey
 
         model = model_name or self._identified()

@@ -7,13 +7,13 @@ import click
 
 from tirelib.cli.common import NEW_FILE, output, write_json
 from tirelib.cli.options import effects_option, json_option
-from tirelib.documents import new_file
-from tirelib.errors import CalibrationError
-from tirelib.units import to_si
+from tirelib.core.documents import new_file
+from tirelib.core.errors import CalibrationError
+from tirelib.core.units import to_si
 
 if TYPE_CHECKING:
     from tirelib.brush.mf_fit import MagicFit
-    from tirelib.parameters import TireFile
+    from tirelib.core.parameters import TireFile
 
 FORMAT = "tirelib-export/1"
 
@@ -85,8 +85,8 @@ def export(
     from tirelib.campaign import read_campaign
     from tirelib.compare.force_model import force_model_of
     from tirelib.compare.magic_points import campaign_points, model_points
+    from tirelib.core.parameters import read_tire
     from tirelib.model.registration import registered_effects
-    from tirelib.parameters import read_tire
 
     given = None if radius is None else to_si(radius, "mm", "length")
     if Path(source).is_dir():

@@ -14,9 +14,9 @@ from tirelib.cli.common import (
 )
 from tirelib.cli.options import json_option, low_pass_options
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.documents import new_file
-from tirelib.errors import FormatError
-from tirelib.flags import TurnFlag
+from tirelib.core.documents import new_file
+from tirelib.core.errors import FormatError
+from tirelib.core.flags import TurnFlag
 from tirelib.observations import Observations, observe
 from tirelib.signal import LowPass
 

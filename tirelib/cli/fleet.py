@@ -17,7 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from tirelib.cli.common import NEW_PLACE, output, write_json
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import EVERY
-from tirelib.errors import TirelibError
+from tirelib.core.errors import TirelibError
 
 if TYPE_CHECKING:
     from tirelib.fleet.engine import Counts
@@ -66,7 +66,7 @@ def run_verb(command: Sequence[str]) -> tuple[int, str]:
         If the verb refuses its input.
     """
     from tirelib.cli import program
-    from tirelib.errors import ParameterError
+    from tirelib.core.errors import ParameterError
 
     said = StringIO()
     with redirect_stdout(said), redirect_stderr(said):

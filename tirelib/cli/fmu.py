@@ -20,7 +20,7 @@ from tirelib.cli.estimate import exit_code, print_document
 from tirelib.cli.fmu_virtual import virtual
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.costs import costs_of
 from tirelib.estimators.result import estimate_document

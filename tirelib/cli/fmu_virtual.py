@@ -7,7 +7,7 @@ import click
 
 from tirelib.cli.common import FILE, NEW_FILE, output
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.fmu.parts import DEFAULT_RATE
 from tirelib.fmu.virtual.spec import build_virtual, default_surface, friction_surface
 

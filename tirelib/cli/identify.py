@@ -16,8 +16,8 @@ from tirelib.cli.options import json_option
 from tirelib.cli.progress import is_verbose, progress_bar, progress_options
 
 if TYPE_CHECKING:
+    from tirelib.core.parameters import TireFile
     from tirelib.identify.whole import Whole
-    from tirelib.parameters import TireFile
 
 BASES = ("plain", "dissertation")
 GIVES_WAY = 10
@@ -85,9 +85,9 @@ def identify(
     json_file: Path | None,
 ) -> None:
     """Fit the base model, ring and brush, to DIR."""
+    from tirelib.core.parameters import read_tire, write_tire
     from tirelib.identify.forces_document import whole_document
     from tirelib.identify.whole import identify_whole
-    from tirelib.parameters import read_tire, write_tire
 
     start = read_tire(tire_file) if tire_file is not None else None
     campaign = read_campaign(folder)

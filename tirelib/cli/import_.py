@@ -17,7 +17,7 @@ from tirelib.campaign.importing.suggest import list_columns, suggest_map
 from tirelib.cli.common import FILE, NEW_FOLDER, output, write_json
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 PLACE = click.Path(path_type=Path)
 FORMAT = "tirelib-import/1"

@@ -26,15 +26,15 @@ from tirelib.cli.options import (
     report_option,
 )
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.errors import FormatError, ParameterError
+from tirelib.core.errors import FormatError, ParameterError
 from tirelib.journey import explains_forces
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from tirelib.campaign import Campaign
+    from tirelib.core.parameters import TireFile
     from tirelib.effects import Effect
-    from tirelib.parameters import TireFile
     from tirelib.planning.document import Plan
     from tirelib.planning.envelope import Axis, Range
 
@@ -134,12 +134,12 @@ def next_test(
     """Tell which further run would separate the suspects of CAMPAIGN best."""
     from tirelib.compare.error import error_of
     from tirelib.compare.model import model_of
+    from tirelib.core.parameters import read_tire
     from tirelib.diagnose.diagnose import diagnose, plain_tires
     from tirelib.diagnose.document import assess, diagnosis_document
     from tirelib.identify.campaign_data import straight_runs
     from tirelib.infer.select import Hypotheses
     from tirelib.model.registration import registered_effects
-    from tirelib.parameters import read_tire
     from tirelib.planning.document import plan_document, plan_test
     from tirelib.planning.envelope import Envelope
     from tirelib.planning.suspects import given_suspects, suspects_of
@@ -293,7 +293,7 @@ def _give(
 
 
 def _si(name: str, given: tuple[float, float] | None) -> "Range | None":
-    from tirelib.quantities import QUANTITIES
+    from tirelib.core.quantities import QUANTITIES
 
     if given is None:
         return None

@@ -10,7 +10,7 @@ from rich.table import Table
 from tirelib.cli.common import NEW_FOLDER, output, write_json
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 if TYPE_CHECKING:
     from tirelib.rig.campaign import Truth

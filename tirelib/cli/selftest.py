@@ -22,7 +22,7 @@ from tirelib.cli.options import (
     seed_option,
 )
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 _EXAMPLE = """\b
 Examples:
@@ -83,9 +83,9 @@ def selftest(
     """Plant each effect at the plan and noise of CAMPAIGN and count how often it is found."""
     from tirelib.compare.error import error_of
     from tirelib.compare.model import model_of
+    from tirelib.core.parameters import read_tire
     from tirelib.identify.campaign_data import straight_runs
     from tirelib.model.registration import registered_effects
-    from tirelib.parameters import read_tire
     from tirelib.planning.selftest import selftest as test_plan
     from tirelib.planning.selftest_document import selftest_document
     from tirelib.waveforms import measure_waveforms

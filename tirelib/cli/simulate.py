@@ -10,13 +10,14 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from tirelib.arrays import FloatArray
 from tirelib.cli.common import NEW_FOLDER, output, write_json
 from tirelib.cli.options import effects_option, json_option
 from tirelib.compare.model import Model, UsedEffect, model_of
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError, ParameterError
+from tirelib.core.parameters import Tire, TireFile, read_tire
+from tirelib.core.units import from_si, to_si
 from tirelib.model.registration import registered_effects
-from tirelib.parameters import Tire, TireFile, read_tire
 from tirelib.report.simulation import (
     CONTACTS,
     LARGEST_BELT_SPEED,
@@ -26,7 +27,6 @@ from tirelib.report.simulation import simulate as simulate_tire
 from tirelib.report.simulation_document import FORMAT, point_document, write_curves
 from tirelib.report.simulation_model import simulate_file
 from tirelib.report.simulation_series import MOST_MODES, bending_length, wanted_modes
-from tirelib.units import from_si, to_si
 
 RINGS = {"large": "large displacements", "linear": "linear"}
 LARGEST_DEFLECTION = 0.2

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from tirelib.cli.options import Decorator
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 _EXAMPLE = """\b
 Examples:

@@ -6,11 +6,11 @@ from tirelib.campaign import Campaign
 from tirelib.compare.forces import ForceComparison, compare_forces
 from tirelib.compare.model import model_of
 from tirelib.compare.strain import Comparison, compare_strain
+from tirelib.core.errors import CalibrationError, ParameterError
+from tirelib.core.parameters import TireFile
+from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.errors import CalibrationError, ParameterError
 from tirelib.identify.force_data import FORCES
-from tirelib.parameters import TireFile
-from tirelib.threads import one_thread
 from tirelib.waveforms import Waveforms, measure_waveforms
 
 QUANTITIES = ("strain", *FORCES)

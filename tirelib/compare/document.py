@@ -14,7 +14,7 @@ from tirelib.compare.set_points import NAMES
 from tirelib.compare.strain import Comparison
 from tirelib.compare.track_words import track_fit
 from tirelib.compare.tracks import Track
-from tirelib.quantities import QUANTITIES
+from tirelib.core.quantities import QUANTITIES
 
 FORMAT = "tirelib-comparison/1"
 

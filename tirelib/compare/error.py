@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
 from tirelib.compare.lag import fitted_delay, late_prediction
 from tirelib.compare.model import Model, Prediction, predict_runs
 from tirelib.compare.set_points import predict_set_points, tangents
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.noise import LEAST_NOISE
 from tirelib.identify.random_effects import Whitening, scales, whitening_of

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
-from tirelib.arrays import FloatArray
 from tirelib.compare.error import ModelError
 from tirelib.compare.model import Model, Prediction
+from tirelib.core.arrays import FloatArray
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.random_effects import Whitening
 from tirelib.model.state import Operating

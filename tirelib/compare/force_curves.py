@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.compare.forces import ForceComparison
 from tirelib.compare.sentences import told
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.identify.error_bands import levels
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.force_points import CELL_ANGLE, CELL_RATIO

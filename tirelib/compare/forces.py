@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.campaign import Campaign
 from tirelib.compare.floor import last_floor
 from tirelib.compare.force_model import (
@@ -27,13 +26,14 @@ from tirelib.compare.force_model import (
 from tirelib.compare.model import UsedEffect
 from tirelib.compare.sentences import told
 from tirelib.compare.strain import verdict_of
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.parameters import TireFile
+from tirelib.core.quantities import QUANTITIES
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.identify.error_bands import levels
 from tirelib.identify.force_data import ForceData, force_data
 from tirelib.identify.force_noise import force_noise
 from tirelib.identify.force_points import CELL_ANGLE, ForcePoints, force_points
-from tirelib.parameters import TireFile
-from tirelib.quantities import QUANTITIES
 
 SLIP_LIMITS = {
     "slip_angle": np.deg2rad([1.0, 2.0, 4.0, 6.0, 9.0]),

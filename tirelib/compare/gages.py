@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.compare.regions import LEVEL, Region, find_regions
 from tirelib.compare.runs import Chosen
 from tirelib.compare.sectors import Cell, cells, weighted_variance
 from tirelib.compare.sentences import amount, extent, millimetres, small
 from tirelib.compare.set_points import SetPoints
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.identify.noise import RepeatNoise, repeat_noise
 from tirelib.waveforms import GRID
 

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.compare.model import Prediction
+from tirelib.core.arrays import FloatArray
 from tirelib.identify.delay import STD, UNIT, by_delay, earlier
 from tirelib.identify.random_effects import Whitening, angle_slope
 

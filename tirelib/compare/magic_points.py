@@ -5,12 +5,12 @@ from itertools import product
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.brush.mf_fit import MagicPoints
 from tirelib.brush.predict import PointForces
 from tirelib.campaign import Campaign
 from tirelib.compare.force_model import ForceModel
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.identify.force_data import ForceData, force_data
 from tirelib.identify.force_points import ForcePoints, force_points
 

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError, FormatError, ParameterError, TirelibError
+from tirelib.core.parameters import TireFile
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.errors import CalibrationError, FormatError, ParameterError, TirelibError
 from tirelib.model.base import predict, values_of
 from tirelib.model.chain import Change, Changes
 from tirelib.model.slopes import slopes_of
 from tirelib.model.solution import solved
 from tirelib.model.state import Operating, State
-from tirelib.parameters import TireFile
 from tirelib.rolling.solve import Start
 from tirelib.signal import LowPass
 from tirelib.waveforms import N_PHI

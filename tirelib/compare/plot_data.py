@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign, Run
 from tirelib.compare.force_curves import set_point_levels
 from tirelib.compare.force_model import force_model_of, usable_points
@@ -22,9 +21,12 @@ from tirelib.compare.forces import ForceComparison
 from tirelib.compare.model import Model
 from tirelib.compare.runs import Chosen, choose
 from tirelib.compare.strain import Comparison
-from tirelib.documents import new_file
+from tirelib.core.arrays import FloatArray
+from tirelib.core.documents import new_file
+from tirelib.core.errors import CalibrationError, ParameterError, TirelibError
+from tirelib.core.parameters import TireFile
+from tirelib.core.quantities import QUANTITIES
 from tirelib.effects import Effect
-from tirelib.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.identify.delay import by_delay
 from tirelib.identify.force_data import FORCES, ForceData, force_data
 from tirelib.identify.force_points import force_points, set_points
@@ -35,8 +37,6 @@ from tirelib.model.chain import Changes
 from tirelib.model.slopes import by_values
 from tirelib.model.solution import solved
 from tirelib.model.state import Operating
-from tirelib.parameters import TireFile
-from tirelib.quantities import QUANTITIES
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID, measure_waveforms
 

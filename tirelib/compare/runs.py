@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.campaign import Tolerance
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import CalibrationError
 from tirelib.identify.campaign_data import TYPICAL_TOLERANCE, usable, working_gages
 from tirelib.identify.error_bands import levels
 from tirelib.waveforms import Waveforms

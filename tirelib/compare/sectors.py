@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.compare.runs import Factor
 from tirelib.compare.set_points import SetPoints
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.identify.noise import RepeatNoise
 from tirelib.waveforms import GRID
 

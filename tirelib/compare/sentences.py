@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.compare.regions import Region
 from tirelib.compare.sectors import SECTORS, sector_at
-from tirelib.quantities import QUANTITIES
+from tirelib.core.arrays import FloatArray
+from tirelib.core.quantities import QUANTITIES
 
 PLACES = {
     "contact": "in the contact",

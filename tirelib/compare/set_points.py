@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.compare.model import Prediction
+from tirelib.core.arrays import FloatArray
 from tirelib.identify import random_effects
 from tirelib.identify.noise import LEAST_NOISE, independent
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.compare.error import ModelError, Yardstick
 from tirelib.compare.floor import Floor, floor_of
 from tirelib.compare.gages import Gage, compare_gages, gage_sentences
@@ -18,6 +17,7 @@ from tirelib.compare.sentences import sentences
 from tirelib.compare.set_points import NAMES, SetPoints, predict_set_points, tangents
 from tirelib.compare.track_words import track_sentences
 from tirelib.compare.tracks import Track, tracks
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.identify.campaign_data import straight_noise
 from tirelib.identify.noise import RepeatNoise
 from tirelib.identify.random_effects import scales

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from tirelib.arrays import BoolArray
 from tirelib.compare.regions import LEAST_SHARE, LEVEL, SLIPS, subsets
 from tirelib.compare.runs import Factor
 from tirelib.compare.sentences import conditions
 from tirelib.compare.tracks import Track
+from tirelib.core.arrays import BoolArray
 
 WORDS = {
     "contact length": ("long", "short"),

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.campaign import Tolerance
 from tirelib.compare.model import Prediction
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.identify.random_effects import angle_slope
 from tirelib.waveforms import GRID, Waveforms
 

@@ -5,10 +5,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.patch import Nodes, PatchEquation
 from tirelib.contact.tread import Tread, numbers
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.ring.compliance import Compliance
 
 LARGEST_ANGLE = 0.75

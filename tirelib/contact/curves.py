@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray
 
 
 def stretched_rule(count: int) -> tuple[FloatArray, FloatArray]:

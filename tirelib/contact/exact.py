@@ -22,13 +22,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact import exact_energy as energy
 from tirelib.contact import radial
 from tirelib.contact.checks import check_radii, check_tread, column, range_text
 from tirelib.contact.free_boundary import Constant
 from tirelib.contact.tread import Tread
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.ring.compliance import compliance
 from tirelib.ring.ring import Ring, columns
 

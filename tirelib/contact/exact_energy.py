@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 N_MODES = 64
 """Enough for the belt's bend at the contact's ends: with 48 a misfit of some microstrain rings at

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.ring.ring import ComplexArray
 
 _BLOCK = 32

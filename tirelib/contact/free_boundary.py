@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact.checks import LARGEST_ANGLE, range_text
 from tirelib.contact.checks import ComplianceAt as ComplianceAt
 from tirelib.contact.patch import Nodes, PatchEquation, between
 from tirelib.contact.start import EdgeEstimate
 from tirelib.contact.tread import Tread
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.errors import ParameterError
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import ComplexArray
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact.fourier import evaluate
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.errors import ParameterError
 from tirelib.ring.lateral import LateralDeflection
 from tirelib.ring.ring import ComplexArray
 

@@ -20,8 +20,8 @@ The belt's tilt and the load transfer follow from the strips' own compliance.
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.ring.ring import ComplexArray
 
 LARGEST_CAMBER = 0.35

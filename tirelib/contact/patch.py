@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import legendre
 
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact.fourier import evaluate, waves
 from tirelib.contact.tread import Tread
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.errors import ParameterError
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import ComplexArray
 

@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import betaln
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.curves import Curve, PowerCurve, SampledCurve, stretched_rule
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError, ShapeError
 
 CROWN_SCALE = 5000.0
 """The number under S_f in Eq. (53), [1/m^2]."""

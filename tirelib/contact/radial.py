@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.checks import (
     LARGEST_ANGLE,
     ComplianceAt,
@@ -43,7 +42,8 @@ from tirelib.contact.free_boundary import (
 )
 from tirelib.contact.patch import Nodes, PatchEquation, place
 from tirelib.contact.tread import Tread, numbers
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import ComplexArray
 

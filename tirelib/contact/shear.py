@@ -20,7 +20,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact import radial
 from tirelib.contact.checks import (
     ComplianceAt,
@@ -45,7 +44,8 @@ from tirelib.contact.shear_system import (
     ShearProblem,
 )
 from tirelib.contact.tread import Tread, numbers
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import ComplexArray
 

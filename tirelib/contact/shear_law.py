@@ -22,10 +22,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.contact.tread import Tread, numbers
-from tirelib.errors import ParameterError
-from tirelib.parameters import Tire
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import Tire
 
 N_ARGUMENTS = 7
 """An element depends on u, v, beta, phi, R_e, R_l, x_0; derivatives stand in this order."""

@@ -7,7 +7,6 @@ grow is taken back and halved. Convergence is quadratic once no element changes 
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact.checks import LARGEST_ANGLE
 from tirelib.contact.fourier import evaluate_fields, load_harmonics
 from tirelib.contact.free_boundary import Constant
@@ -23,6 +22,7 @@ from tirelib.contact.shear_system import (
     System,
     assemble,
 )
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import ComplexArray
 

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
 from tirelib.contact.fourier import evaluate_fields, load_harmonics
 from tirelib.contact.shear_law import Elements, Rolling, Shear, elements
 from tirelib.contact.tread import Tread
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import ComplexArray
 

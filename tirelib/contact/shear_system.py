@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact.checks import ComplianceAt
 from tirelib.contact.patch import Nodes
 from tirelib.contact.shear_law import Elements, Rolling, Shear, elements
 from tirelib.contact.tread import Tread
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import ComplexArray
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.tread import Tread
+from tirelib.core.arrays import FloatArray
 from tirelib.ring.compliance import Compliance
 
 _HARMONICS = (4, 10, 20)

@@ -20,9 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.static_solve import active_set, edge, flexibility
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.ring.green import positive, pressed_shape, wrapped
 
 LARGEST_DEFLECTION = 0.25

@@ -3,8 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.errors import ConvergenceError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import ConvergenceError
 from tirelib.ring.green import point_response
 
 

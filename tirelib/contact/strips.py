@@ -24,7 +24,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.contact.fourier import evaluate, load_harmonics
 from tirelib.contact.layout import (
     Layout,
@@ -38,8 +37,9 @@ from tirelib.contact.mixing import Mixer
 from tirelib.contact.patch import Nodes, PatchEquation
 from tirelib.contact.radial import RadialContact, load, press
 from tirelib.contact.tread import Tread
-from tirelib.errors import ConvergenceError, ParameterError
-from tirelib.parameters import Tire
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.errors import ConvergenceError, ParameterError
+from tirelib.core.parameters import Tire
 from tirelib.ring.compliance import Compliance, compliance
 from tirelib.ring.lateral import LateralBelt, LateralDeflection, bend_belt
 from tirelib.ring.ring import ComplexArray, Ring

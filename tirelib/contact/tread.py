@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
-from tirelib.errors import ParameterError
-from tirelib.parameters import Tire
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import Tire
 
 
 def numbers(where: str, value: Any, name: str) -> FloatArray:

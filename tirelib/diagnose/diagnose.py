@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.threads import one_thread
 from tirelib.diagnose.fitted import Fitted
 from tirelib.diagnose.guess import Guess, guess_law
 from tirelib.diagnose.strain_models import StrainModels
@@ -19,7 +20,6 @@ from tirelib.infer.plain import BASE, ROUGHLY, Family, load
 from tirelib.infer.problem import Problem
 from tirelib.infer.select import Verdict, select
 from tirelib.problems.strain import StrainProblem
-from tirelib.threads import one_thread
 
 TABLE = Path(__file__).parents[1] / "infer" / "plain_tires.npz"
 """What plain tires show (`build/structure/learn.py`)."""

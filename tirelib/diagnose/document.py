@@ -8,13 +8,13 @@ import numpy as np
 
 from tirelib.compare.error import NOISE, ModelError, named_errors
 from tirelib.compare.model import Model
+from tirelib.core.errors import TirelibError
 from tirelib.diagnose.diagnose import Diagnosis, Finding
 from tirelib.diagnose.fitted import Fitted
 from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.guess import Guess
 from tirelib.diagnose.left import Left, left_of, told_powers
 from tirelib.diagnose.told import Assessed, listed, next_step
-from tirelib.errors import TirelibError
 
 NO_REPEATS = (
     "no runs were repeated at equal set points, so the noise is unknown: errors are in "

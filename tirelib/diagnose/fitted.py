@@ -11,11 +11,11 @@ from functools import partial
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
 from tirelib.compare.error import ModelError, Yardstick
 from tirelib.compare.model import Model
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import TirelibError
 from tirelib.effects import Effect
-from tirelib.errors import TirelibError
 from tirelib.identify.delay import UNIT
 from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.posterior import ROUGH, Posterior, posterior

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.diagnose.left import Power
 from tirelib.identify.error_bands import levels
 from tirelib.identify.random_effects import angle_slope

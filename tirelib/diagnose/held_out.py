@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import BoolArray
 from tirelib.compare.error import ModelError, Yardstick
+from tirelib.core.arrays import BoolArray
+from tirelib.core.errors import TirelibError
+from tirelib.core.quantities import QUANTITIES
 from tirelib.diagnose.fitted import Fitted
-from tirelib.errors import TirelibError
 from tirelib.identify.campaign_data import LEAST_RUNS, Data
 from tirelib.identify.error_bands import levels
-from tirelib.quantities import QUANTITIES
 
 LEAST_LOADS, LEAST_PRESSURES = 3, 2
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from tirelib.arrays import FloatArray
 from tirelib.compare.error import ModelError
 from tirelib.compare.sectors import SECTORS, sectors_of
 from tirelib.compare.sentences import PLACES
+from tirelib.core.arrays import FloatArray
 from tirelib.identify.error_bands import levels
 from tirelib.model.state import Operating
 from tirelib.waveforms import GRID

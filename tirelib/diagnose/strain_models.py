@@ -8,12 +8,12 @@ import numpy as np
 
 from tirelib.compare.error import ModelError, Yardstick
 from tirelib.compare.model import Model
+from tirelib.core.errors import ConvergenceError
+from tirelib.core.forked import forked
 from tirelib.diagnose.fitted import Fitted, fitted, least_error
 from tirelib.diagnose.floor import floor_of
 from tirelib.diagnose.held_out import folds, held_out, values_of_errors
 from tirelib.effects import Effect
-from tirelib.errors import ConvergenceError
-from tirelib.forked import forked
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.select import Hypotheses
 from tirelib.problems.strain import StrainProblem

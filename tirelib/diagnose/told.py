@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.diagnose.diagnose import Finding
 from tirelib.diagnose.held_out import Fold, fold_entry, pooled
 from tirelib.infer.select import Verdict

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.errors import ParameterError, TirelibError
-from tirelib.units import TABLE
+from tirelib.core.errors import ParameterError, TirelibError
+from tirelib.core.units import TABLE
 
 HOOKS = {
     "stiffness": "constants",

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from tirelib.core.errors import ParameterError
 from tirelib.effects.effect import State, effect
-from tirelib.errors import ParameterError
 
 REFERENCE = 5e-3
 """Strain at which the strength is the lost share, [-]."""

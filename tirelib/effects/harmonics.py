@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.effects.effect import State
 from tirelib.ring.ring import ComplexArray
 

@@ -6,9 +6,9 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
 
+from tirelib.core.errors import FormatError
 from tirelib.effects import CATALOGUE
 from tirelib.effects.effect import Effect
-from tirelib.errors import FormatError
 
 GROUP = "tirelib.effects"
 """Entry-point group: each entry names an `Effect`, or a list or mapping of them."""

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.fourier import load_harmonics
 from tirelib.contact.radial import RadialContact, load
+from tirelib.core.arrays import FloatArray
 from tirelib.effects.effect import State
 from tirelib.ring.ring import ComplexArray
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.estimators.polynomial import Polynomial
 
 WIDEST = 0.5

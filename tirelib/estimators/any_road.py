@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.estimators.sliding import CURVE_DOUBT, TINY, SlidingCurve, Told, angle_of, lost_slip
 from tirelib.estimators.unknowns import FRICTION
 

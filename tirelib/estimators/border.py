@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.fit_angle import LEAST_ANGLE, fit_angle
 from tirelib.estimators.fit_links import fit_drag, fit_force, fit_load, fit_moment, fit_radius

@@ -5,8 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import CalibrationError
+from tirelib.core.flags import INVALIDATING, TurnFlag
+from tirelib.core.sizes import differing
+from tirelib.core.threads import one_thread
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.contact_length import contact_lengths
 from tirelib.estimators.doubt import doubt, with_moved
@@ -15,10 +18,7 @@ from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.unknowns import PLAUSIBLE
 from tirelib.features.extract import Features
-from tirelib.flags import INVALIDATING, TurnFlag
 from tirelib.signal.quality import UNUSABLE
-from tirelib.sizes import differing
-from tirelib.threads import one_thread
 
 UNITS = {"Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
 """Unit of each estimated quantity inside the library."""
@@ -151,7 +151,7 @@ class Calibration:
     def estimate(self, features: Features) -> Estimates:
         """Estimate every turn; a turn with one gage out uses the chain without it.
 
-        The compiled core estimates, where there is one for this machine (`tirelib.core`).
+        The compiled core estimates, where there is one for this machine (`tirelib.core.compiled`).
         """
         from tirelib.estimators.compiled import core_calibration  # which imports this module
 

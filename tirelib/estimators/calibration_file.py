@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import FormatError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import FormatError
 from tirelib.estimators.angle_model import AngleModel
 from tirelib.estimators.border import Border
 from tirelib.estimators.calibration import Calibration, Rolling

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.estimators import tilt
 from tirelib.estimators.angle_model import WIDEST, AngleModel
 from tirelib.estimators.any_road import Seen, tell

@@ -1,4 +1,4 @@
-"""Estimates of the compiled core, see `tirelib.core`."""
+"""Estimates of the compiled core, see `tirelib.core.compiled`."""
 
 from collections import OrderedDict
 from functools import lru_cache
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.core import (
+from tirelib.core.compiled import (
     CONDITIONS,
     FEATURE_ROWS,
     Core,
@@ -17,7 +17,7 @@ from tirelib.core import (
     loaded_core,
     memory,
 )
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.core_table import flat_table
 from tirelib.estimators.estimate import QUANTITIES

@@ -12,7 +12,7 @@ and shows half and double of each; ``docs/theory/signal.md`` has the table.
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 BIAS = 0.051
 """True less read contact angle, [rad]."""

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.campaign.recording import Block, Recording, Wheel, blocks
+from tirelib.core.arrays import FloatArray
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.features.extract import Features, extract_features
 from tirelib.signal import LowPass, Turn, TurnCutter, Turns, stack_turns

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from tirelib.campaign.recording import Recording
-from tirelib.documents import new_file, plain
+from tirelib.core.documents import new_file, plain
+from tirelib.core.flags import flag_names
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.continuous import WheelTurns
 from tirelib.estimators.edge import EDGE_UNIT, FORMAT
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.likeness import suspected
 from tirelib.estimators.result import other_tire, turn_row
-from tirelib.flags import flag_names
 
 SLICE = 600.0
 """Length of the slices whose means the document holds, [s]: a drift over a drive shows in them."""

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import FormatError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import FormatError
 from tirelib.estimators import (
     angle_model,
     any_road,

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.calibrate import calibrate_chain
 from tirelib.estimators.calibration import LARGEST_ANGLE_STD
 from tirelib.estimators.dissertation import FREE, SMALL_ANGLE, UPRIGHT, Means

@@ -9,7 +9,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.features.extract import Features
 
 ANGLE_STEP = 1e-3

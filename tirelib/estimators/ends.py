@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.estimators.polynomial import leverage
 from tirelib.estimators.ridge import Ridge, ridge_fits
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.basis import Powers
 from tirelib.estimators.border import Border
 from tirelib.estimators.ends import FAR, End, growth, left_out, near

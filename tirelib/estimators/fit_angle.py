@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.estimators import basis
 from tirelib.estimators.angle_model import AngleModel
 from tirelib.estimators.ends import End, growth

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators import basis
 from tirelib.estimators.ends import outermost
 from tirelib.estimators.fit import Fit, fit_best

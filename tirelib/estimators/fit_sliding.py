@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.estimators.sliding import BRUSH, FREE, LOAD, USUAL_FRICTION, SlidingCurve
 
 GRIP = (0.95, 0.05)

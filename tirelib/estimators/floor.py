@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.polynomial import Polynomial
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, IntArray
+from tirelib.core.arrays import BoolArray, IntArray
 
 
 def held_out_folds(groups: IntArray, most: int | None = None) -> Iterator[BoolArray]:

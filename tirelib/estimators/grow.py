@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.estimators.basis import Powers
 from tirelib.estimators.fit import design_for, inner_levels
 from tirelib.estimators.ridge import ridge_fit

@@ -35,7 +35,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 
 PRESSURE_ENVELOPE = (0.5, 1.25)
 """Pressure, relative to the calibrated one, for which the pressure law is taken to hold."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtr
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.estimators import tilt
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Term, Variable, design

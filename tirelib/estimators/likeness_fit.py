@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.estimators.basis import G1, G2, L1, L2, ONE, P1, T1, T2, Powers, V, times
 from tirelib.estimators.fit import design_for
 from tirelib.estimators.likeness import AGREEMENT, DRIFT, Likeness

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.estimators.calibrate import fit_sliding_of, laws_of
 from tirelib.estimators.likeness import SHARE_UNLIKE
 from tirelib.estimators.likeness_fit import fit_likeness

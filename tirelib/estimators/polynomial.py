@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.estimators.border import Border
 from tirelib.estimators.pulled import pull_share
 

@@ -11,7 +11,7 @@ both those that make the held-out errors most likely.
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 PULL = 0.03
 """Traction at which half of it counts, T0. The rig's tires show up to 0.01 when they roll freely

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range
 from tirelib.estimators.regressors import ODD, SHAPE

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 
 POINTS = 1024
 """Wheel angles of a stored turn."""

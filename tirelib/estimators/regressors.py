@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.features.extract import Features
 
 EVEN = ("contact_angle", "compression", "traction", "tension")

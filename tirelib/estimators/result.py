@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.flags import TurnFlag, flag_names
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.costs import COLUMN, Cost
@@ -16,7 +17,6 @@ from tirelib.estimators.edge import EDGE_UNIT, FORMAT, VARIED
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.likeness import suspected
 from tirelib.features.extract import Features
-from tirelib.flags import TurnFlag, flag_names
 from tirelib.observations import Observations, mean_by
 
 TRUTH = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 
 MOST_STEPS = 500
 """Steps after which the iteration ends where it is."""

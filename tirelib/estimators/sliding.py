@@ -28,7 +28,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.estimators.polynomial import Polynomial
 
 LOAD = 4000.0

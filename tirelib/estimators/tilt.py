@@ -12,7 +12,7 @@ each are in ``docs/theory/estimate_numbers.md``.
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 USUAL = float(np.deg2rad(2.0))
 """Standard deviation of a camber that nobody gives, [rad]: makers set their cars to -1.8 to 0.75

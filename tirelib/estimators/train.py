@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import CalibrationError
+from tirelib.core.threads import one_thread
 from tirelib.estimators.calibrate import calibrate_chain, measured
 from tirelib.estimators.calibration import Calibration, Rolling
 from tirelib.estimators.cornering import CorneringTrend, cornering_trend
@@ -15,7 +16,6 @@ from tirelib.estimators.links import Links
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.observations import Observations, geometry_of, mean_by
 from tirelib.signal import LowPass
-from tirelib.threads import one_thread
 
 ROLLING_SIGMAS = 4.0
 """Scatter of free-rolling turns, in standard deviations, that is not called traction."""

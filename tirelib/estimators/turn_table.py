@@ -10,13 +10,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from tirelib import __version__
-from tirelib.arrays import FloatArray, IntArray
-from tirelib.documents import new_file
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.documents import new_file
+from tirelib.core.flags import flag_names
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.edge import EDGE_UNIT
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.features.extract import Features
-from tirelib.flags import flag_names
 from tirelib.signal.quality import UNUSABLE
 
 CONDITIONS = {

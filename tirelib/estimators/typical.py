@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
+from tirelib.core.arrays import FloatArray
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.reference_turn import ReferenceTurn, folded
 from tirelib.observations import Observations

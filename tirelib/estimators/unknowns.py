@@ -33,7 +33,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 
 Pair = tuple[float, float]
 

@@ -13,10 +13,11 @@ import numpy as np
 from tirelib.campaign import Campaign
 from tirelib.compare.force_model import ForceModel, force_model_of
 from tirelib.compare.model import Model, model_of
+from tirelib.core.errors import CalibrationError, ParameterError, TirelibError
+from tirelib.core.parameters import TireFile
 from tirelib.diagnose.document import Assessment
 from tirelib.diagnose.forces.assess import ForceAssessment, force_cases
 from tirelib.effects import Effect
-from tirelib.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.extend.document import extension_document
 from tirelib.extend.extension import (
     Extension,
@@ -38,7 +39,6 @@ from tirelib.extend.model_file import extended_file
 from tirelib.extend.step import Step
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.force_data import FORCES
-from tirelib.parameters import TireFile
 from tirelib.waveforms import measure_waveforms
 
 Progress = Callable[[str], None]

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from tirelib.compare.error import named_errors
+from tirelib.core.parameters import TireFile
 from tirelib.diagnose.held_out import fold_entry, pooled
 from tirelib.diagnose.told import strength_told
 from tirelib.extend.extension import Extension
 from tirelib.extend.step import Step
-from tirelib.parameters import TireFile
 
 FORMAT = "tirelib-extension/1"
 NO_REPEATS = (

@@ -6,17 +6,17 @@ from difflib import get_close_matches
 
 from tirelib.compare.error import ModelError
 from tirelib.compare.model import Model
+from tirelib.core.errors import ParameterError
+from tirelib.core.threads import one_thread
 from tirelib.diagnose.diagnose import FALSE_ALARM, plain_tires
 from tirelib.diagnose.fitted import Fitted
 from tirelib.diagnose.strain_models import StrainModels
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.errors import ParameterError
 from tirelib.extend.step import Step, added, kept, refuse_second, removed
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.select import Hypotheses
 from tirelib.problems.strain import StrainProblem
 from tirelib.problems.strain_living import in_base
-from tirelib.threads import one_thread
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,12 +3,12 @@
 from typing import Any
 
 from tirelib.compare.forces import UNITS
+from tirelib.core.parameters import TireFile
 from tirelib.diagnose.held_out import fold_entry, pooled
 from tirelib.extend.document import step_document
 from tirelib.extend.force_extension import ForceExtension
 from tirelib.extend.model_file import history_entry, refuse_beyond, stepped
 from tirelib.identify.brush_model import stored_number
-from tirelib.parameters import TireFile
 
 
 def force_extension_document(done: ForceExtension, file: TireFile) -> dict[str, Any]:

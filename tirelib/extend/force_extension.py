@@ -5,16 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError, TirelibError
+from tirelib.core.threads import one_thread
 from tirelib.diagnose.diagnose import FALSE_ALARM
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.fit import ForceFit
 from tirelib.diagnose.forces.models import ForceModels
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.errors import ParameterError, TirelibError
 from tirelib.extend.step import Step, added, kept, refuse_second, removed
 from tirelib.problems.forces import ForceProblem
-from tirelib.threads import one_thread
 
 
 @dataclass(frozen=True, eq=False)

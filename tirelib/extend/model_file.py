@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from tirelib import __version__
+from tirelib.core.errors import FormatError
+from tirelib.core.parameters import NUMBERS, Number, TireFile
+from tirelib.core.parameters.tire import range_fault
 from tirelib.diagnose.held_out import pooled
 from tirelib.diagnose.told import strength_told
-from tirelib.errors import FormatError
 from tirelib.extend.extension import Extension
 from tirelib.extend.step import Step
 from tirelib.model.base import BARE, coordinates
-from tirelib.parameters import NUMBERS, Number, TireFile
-from tirelib.parameters.tire import range_fault
 
 
 def extended_file(file: TireFile, done: Extension, data_hash: str) -> TireFile:

@@ -10,10 +10,10 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.diagnose.held_out import Fold
 from tirelib.effects import Effect
-from tirelib.errors import CalibrationError, ParameterError
 
 SIGNIFICANT = 2.0
 """Standard deviations below which a strength is no different from zero."""

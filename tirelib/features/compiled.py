@@ -1,11 +1,11 @@
-"""Features read by the compiled core, see `tirelib.core`."""
+"""Features read by the compiled core, see `tirelib.core.compiled`."""
 
 from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.core import (
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.compiled import (
     FEATURE_ROWS,
     GAGES,
     TURN_ROWS,
@@ -18,7 +18,7 @@ from tirelib.core import (
     memory,
     reals_of,
 )
-from tirelib.held import Held
+from tirelib.core.held import Held
 from tirelib.signal.compiled import BLOCK, Record
 from tirelib.signal.lowpass import LowPass
 from tirelib.signal.turn import Turns

@@ -20,11 +20,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.core import GAGES, loaded_core
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.compiled import GAGES, loaded_core
+from tirelib.core.flags import TurnFlag
 from tirelib.features.compiled import read_by_core
 from tirelib.features.peaks import peak
-from tirelib.flags import TurnFlag
 from tirelib.signal.turn import PHI
 from tirelib.signal.turns import AFTER, Turns
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 
 
 def peak(

@@ -6,11 +6,11 @@ from typing import Unpack
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.core import loaded_core
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.compiled import loaded_core
+from tirelib.core.held import Held
 from tirelib.features.compiled import CompiledRecords
 from tirelib.features.extract import Features, extract_features
-from tirelib.held import Held
 from tirelib.signal.lowpass import LowPass
 from tirelib.signal.turns import check_gages, cut_turns
 
@@ -18,7 +18,7 @@ from tirelib.signal.turns import check_gages, cut_turns
 class RecordReader:
     """Takes records of the same gages and gives the features of all their turns.
 
-    The compiled core computes, where there is one for this machine (`tirelib.core`).
+    The compiled core computes, where there is one for this machine (`tirelib.core.compiled`).
 
     Parameters
     ----------

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from tirelib.core.flags import flag_names
 from tirelib.features.extract import Features
-from tirelib.flags import flag_names
 
 if TYPE_CHECKING:
     import pandas as pd

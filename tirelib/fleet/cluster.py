@@ -11,7 +11,7 @@ from distributed import Client, LocalCluster
 from distributed.utils import silence_logging_cmgr
 
 from tirelib import __version__
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 CONNECT = 20.0
 """Time in which a scheduler must answer, [s]: one that is started at the same moment answers after

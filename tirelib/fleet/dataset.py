@@ -21,7 +21,7 @@ import pyarrow as pa
 import pyarrow.dataset as pads
 import pyarrow.parquet as pq
 
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.fleet.sources import filesystem
 from tirelib.fleet.tables import PARTITION, SCHEMAS, SMALL
 

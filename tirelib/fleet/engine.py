@@ -14,7 +14,7 @@ from distributed import Client, Future, as_completed
 from distributed.comm.core import CommClosedError
 
 from tirelib import __version__
-from tirelib.errors import FormatError, ParameterError, TirelibError
+from tirelib.core.errors import FormatError, ParameterError, TirelibError
 from tirelib.fleet.dataset import ALSO_AS, ALSO_AT, DataSet, Finished, Rows
 from tirelib.fleet.rows import Row
 from tirelib.fleet.sources import Source, fingerprint
@@ -156,8 +156,8 @@ def _taken(data: DataSet, name: str, given: str) -> tuple[str, str]:
 
 def _check_readable(name: str, path: Path) -> None:
     """Refuse once, before any work, what every task would refuse."""
+    from tirelib.core.parameters import read_tire
     from tirelib.estimators.calibration_file import read_calibration
-    from tirelib.parameters import read_tire
 
     try:
         read_calibration(path) if name == "calibration" else read_tire(path)
@@ -167,7 +167,7 @@ def _check_readable(name: str, path: Path) -> None:
 
 def _shipped(data: DataSet, name: str) -> tuple[str, str]:
     """Write a tire that ships with tirelib as a file."""
-    from tirelib.parameters import read_tire, write_tire
+    from tirelib.core.parameters import read_tire, write_tire
 
     try:
         tire = read_tire(name)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pyarrow.dataset as pads
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.fleet.dataset import ALSO_AT, DataSet
 from tirelib.fleet.siblings import join
 from tirelib.fleet.spread import (

@@ -10,10 +10,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from tirelib import __version__
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.flags import flag_names
 from tirelib.features.table import PER_TURN
 from tirelib.features.table import units as units_of_features
-from tirelib.flags import flag_names
 from tirelib.fleet.tables import SCHEMAS
 
 MOST_KEPT = 4096

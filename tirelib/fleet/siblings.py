@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 FEWEST_SIBLINGS = 4
 """Tires that can be siblings: with a flat prior three leave the scatter without an upper bound."""

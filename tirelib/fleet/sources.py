@@ -11,7 +11,7 @@ from fsspec.core import url_to_fs
 
 from tirelib.campaign.header import FILE as CAMPAIGN
 from tirelib.campaign.recording import FILE as RECORDING
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 CHUNK = 1 << 20
 

@@ -26,7 +26,7 @@ from tirelib.campaign.plan import parse_plans
 from tirelib.campaign.problem import Problem, errors_of
 from tirelib.campaign.recording import FILE as RECORDING
 from tirelib.campaign.recording import read_recording
-from tirelib.errors import FormatError, TirelibError
+from tirelib.core.errors import FormatError, TirelibError
 from tirelib.fleet.dataset import HEAD, DataSet, now
 from tirelib.fleet.rows import Channels, Row, every, result_rows
 from tirelib.fleet.sources import Source, content_hash, fetched

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
-from tirelib.errors import FormatError, ParameterError
+from tirelib.core.errors import FormatError, ParameterError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.core_table import flat_table

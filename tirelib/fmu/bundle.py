@@ -13,7 +13,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 PACKAGE = "tirelib"
 ALLOWED = frozenset({"numpy", "scipy", "pythonfmu", "tomli_w"})
@@ -67,7 +67,7 @@ def renamed(source: str, package: str) -> str:
 
     Examples
     --------
-    >>> renamed("from tirelib.errors import TirelibError", "tirelib_0")
+    >>> renamed("from tirelib.core.errors import TirelibError", "tirelib_0")
     'from tirelib_0.errors import TirelibError'
     """
     return _BROUGHT.sub(rf"\g<1>{package}.\g<2>", _IMPORT.sub(rf"\g<1>{package}", source))

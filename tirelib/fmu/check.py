@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from tirelib import __version__
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.fmu.reference import FOLDER, TOLERANCE
 
 FORMAT = "tirelib-fmu-check/1"

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 
 from tirelib import __version__
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.fmu.bundle import BROUGHT, collect, write_package
 from tirelib.fmu.parts import check_writable, identity_of, source_file, write_fmu
 from tirelib.fmu.spec import SlaveSpec

@@ -14,8 +14,8 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from tirelib import __version__
-from tirelib.arrays import FloatArray
-from tirelib.errors import FormatError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import FormatError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.core_table import flat_table
 from tirelib.fmu.describe3 import build_description, flat_names, model_description

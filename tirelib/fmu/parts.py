@@ -12,8 +12,8 @@ from pathlib import Path
 from uuid import UUID, uuid5
 
 from tirelib import __version__
-from tirelib.core import shipped
-from tirelib.errors import FormatError
+from tirelib.core.compiled import shipped
+from tirelib.core.errors import FormatError
 from tirelib.fmu.bundle import content_hash
 from tirelib.fmu.describe import described, repack
 from tirelib.fmu.spec import SlaveSpec

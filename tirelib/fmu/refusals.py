@@ -1,6 +1,6 @@
 """Refused steps of a slave: an error class, and their entry in ``status``."""
 
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 STEP_REFUSED = "step_refused"
 """Word of ``status`` after a communication step that was not done."""

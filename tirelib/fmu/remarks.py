@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tirelib.core.flags import TurnFlag
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.polynomial import Range
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.unknowns import PLAUSIBLE
-from tirelib.flags import TurnFlag
 from tirelib.signal.quality import UNUSABLE
 from tirelib.signal.turns import LARGEST_OMEGA_RATIO
 from tirelib.stream.estimate import TurnEstimate

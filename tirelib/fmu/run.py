@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
 from tirelib.campaign import Campaign, Run, conditions_of
-from tirelib.errors import CalibrationError, FormatError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import CalibrationError, FormatError
+from tirelib.core.flags import INVALIDATING, flag_names
+from tirelib.core.held import HELD
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.features.extract import Features
-from tirelib.flags import INVALIDATING, flag_names
 from tirelib.fmu.build import embedded_calibration
-from tirelib.held import HELD
 from tirelib.observations import SET_POINTS, TRUTH, Observations, geometry_of, truth_of
 
 

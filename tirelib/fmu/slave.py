@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn, Protocol
 
-from tirelib.errors import FormatError, ParameterError, TirelibError
+from tirelib.core.errors import FormatError, ParameterError, TirelibError
 from tirelib.fmu.journal import Journal
 from tirelib.fmu.refusals import STEP_REFUSED, StepError, status_entry
 from tirelib.fmu.variables import Variable

@@ -14,13 +14,13 @@ from functools import partial
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.held import HELD
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.fmu.reference import Reference, contact_strain
 from tirelib.fmu.variables import inputs, outputs
 from tirelib.fmu.wheel import Wheel
-from tirelib.held import HELD
 from tirelib.stream.reference import NumpyEstimator
 
 TURNS, STILL = 6.4, 2.3

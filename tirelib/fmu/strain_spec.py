@@ -5,10 +5,10 @@ import tomllib
 from collections.abc import Mapping
 from typing import Any
 
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
+from tirelib.core.flags import INVALIDATING, TurnFlag
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.core_table import VALUES
-from tirelib.flags import INVALIDATING, TurnFlag
 from tirelib.fmu.describe3 import CLOCK, JOINED, joined
 from tirelib.fmu.handbook import html_table, page
 from tirelib.fmu.parts import source_file

@@ -3,9 +3,9 @@
 import math
 from dataclasses import dataclass
 
+from tirelib.core.flags import TurnFlag
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.unknowns import Road
-from tirelib.flags import TurnFlag
 
 NAN = math.nan
 RIGHT = 0.5 * math.pi

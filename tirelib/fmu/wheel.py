@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.axes import sign
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.axes import sign
+from tirelib.core.errors import ParameterError
+from tirelib.core.flags import TurnFlag, flag_names
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.estimate import QUANTITIES
-from tirelib.flags import TurnFlag, flag_names
 from tirelib.fmu.refusals import FAULT, StepError, status_entry
 from tirelib.fmu.remarks import Remark, remarks
 from tirelib.signal.turns import LONGEST_TURN

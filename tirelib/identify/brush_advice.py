@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.identify.brush_cells import Conditions, sliding_slips
 from tirelib.identify.brush_law import point_parameters
 from tirelib.identify.brush_misfit import ForceMisfit, Shape, kernel

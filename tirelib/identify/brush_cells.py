@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.brush.predict import PointParameters
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.identify.brush_law import point_parameters
 from tirelib.identify.brush_problem import BrushProblem
 from tirelib.identify.error_bands import levels

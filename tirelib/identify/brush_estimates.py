@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.identify.brush_law import SPECS
 from tirelib.identify.brush_misfit import Term
 from tirelib.identify.brush_properties import property_terms, slope_terms

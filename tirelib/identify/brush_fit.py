@@ -15,16 +15,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.brush.predict import PointForces, PointParameters
-from tirelib.errors import CalibrationError, ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError, ParameterError
+from tirelib.core.parameters import Tire
 from tirelib.identify.brush_law import NEUTRAL, SPECS, Reference, point_parameters, predict
 from tirelib.identify.brush_problem import ASSUMED_HALF_LENGTH, BrushProblem
 from tirelib.identify.error_bands import BandError, band_errors
 from tirelib.identify.force_checks import refuse_wrong_forces, slips_vary
 from tirelib.identify.force_data import FORCES, ForceData
 from tirelib.identify.ring_patch import ring_half
-from tirelib.parameters import Tire
 
 LOAD_RATIO = 1.1
 """Least ratio of loads that tells anything of the law."""

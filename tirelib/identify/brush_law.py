@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.brush.predict import PointConditions, PointForces, PointParameters, predict_forces
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.identify.force_data import ForceData
 
 

@@ -20,7 +20,7 @@ from itertools import product
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.identify.brush_cells import Cells, Conditions
 
 LENGTHS = (0.5, 1.0, 2.0)

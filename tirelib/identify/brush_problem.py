@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.brush.predict import PointForces
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.identify.brush_law import SPECS, Reference, predict
 from tirelib.identify.force_data import ForceData
 

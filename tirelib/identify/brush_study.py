@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.identify.brush_cells import cells_of, slip_stiffnesses
 from tirelib.identify.brush_fit import BrushFit
 from tirelib.identify.brush_misfit import Misfit, misfit_of

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
 from tirelib.campaign import Tolerance
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import CalibrationError
 from tirelib.identify.noise import RepeatNoise, measured_tangents, repeat_noise
 from tirelib.identify.strain_notes import (
     LEAST_LOAD_RATIO,

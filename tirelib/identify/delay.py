@@ -6,7 +6,7 @@ later by an angle that goes with the speed. Left alone it is most of what a good
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.effects.effect import State
 from tirelib.effects.harmonics import orders, with_gain
 from tirelib.identify.random_effects import angle_slope

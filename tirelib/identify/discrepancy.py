@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.model.state import Operating
 
 REFERENCE_LOAD = 4000.0

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
+from tirelib.core.arrays import FloatArray
+from tirelib.core.parameters import FIELDS, TireFile
+from tirelib.core.units import from_si
 from tirelib.identify.estimate import Estimate
 from tirelib.identify.identify import WITHOUT_EFFECTS, Identification
-from tirelib.parameters import FIELDS, TireFile
 from tirelib.ring.frequencies import rim_stiffness
-from tirelib.units import from_si
 
 FORMAT = "tirelib-identification/1"
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.identify.force_data import ForceData
 
 ANGLES = np.deg2rad([0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 90.0])

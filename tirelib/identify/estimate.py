@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from tirelib.parameters import NUMBERS
+from tirelib.core.parameters import NUMBERS
 
 
 @dataclass(frozen=True, slots=True)

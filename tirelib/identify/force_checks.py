@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError
 from tirelib.identify.force_data import ForceData
 
 ANGLE_SPAN, RATIO_SPAN = np.deg2rad(1.0), 0.01

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.campaign import Campaign, Run
-from tirelib.errors import CalibrationError, ParameterError, ShapeError
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import CalibrationError, ParameterError, ShapeError
 
 FORCES = ("Fy", "Fx", "Mz")
 CONDITIONS = ("load", "pressure", "slip_angle", "slip_ratio", "camber", "omega")

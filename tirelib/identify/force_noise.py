@@ -10,7 +10,7 @@ American Statistical Association 74 (1979) 829-836).
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.identify.force_points import (
     CELL_ANGLE,
     CELL_RATIO,

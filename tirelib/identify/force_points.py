@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.identify.error_bands import MOST_LEVELS
 from tirelib.identify.force_data import ForceData
 from tirelib.model.brush import BrushConditions

@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import IntArray
 from tirelib.campaign import Campaign
-from tirelib.errors import TirelibError
-from tirelib.forked import forked
+from tirelib.core.arrays import IntArray
+from tirelib.core.errors import TirelibError
+from tirelib.core.forked import forked
+from tirelib.core.parameters import Number, Tire
+from tirelib.core.threads import one_thread
 from tirelib.identify.brush_advice import advice
 from tirelib.identify.brush_estimates import SlipStiffness, estimates_of, slip_stiffness
 from tirelib.identify.brush_fit import BrushFit, fit_brush
@@ -27,8 +29,6 @@ from tirelib.identify.lateral_force import (
     cells_of_load,
     compare_pressures,
 )
-from tirelib.parameters import Number, Tire
-from tirelib.threads import one_thread
 
 MOST_SAMPLES = 50000
 """A longer sweep is thinned evenly: its samples are closer than its errors are independent."""

@@ -5,6 +5,9 @@ from typing import Any
 import numpy as np
 
 from tirelib.campaign import Campaign
+from tirelib.core.parameters import NUMBERS
+from tirelib.core.quantities import QUANTITIES
+from tirelib.core.units import from_si
 from tirelib.identify.brush_estimates import SlipStiffness
 from tirelib.identify.brush_model import STORED
 from tirelib.identify.document import FORMAT, identification_document
@@ -13,9 +16,6 @@ from tirelib.identify.estimate import Estimate
 from tirelib.identify.forces import ForceIdentification
 from tirelib.identify.lateral_force import PressureComparison
 from tirelib.identify.whole import Whole
-from tirelib.parameters import NUMBERS
-from tirelib.quantities import QUANTITIES
-from tirelib.units import from_si
 
 _DEG = float(np.pi / 180.0)
 

@@ -10,9 +10,12 @@ from typing import Any
 import numpy as np
 
 from tirelib import __version__
-from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign, CampaignHeader
-from tirelib.errors import CalibrationError, ParameterError, TirelibError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError, ParameterError, TirelibError
+from tirelib.core.parameters import FIELDS, Number, TireFile
+from tirelib.core.threads import one_thread
+from tirelib.core.units import from_si
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.discrepancy import COARSE, Discrepancy
 from tirelib.identify.estimate import Estimate
@@ -22,9 +25,6 @@ from tirelib.identify.strain_notes import gage_notes, run_notes
 from tirelib.identify.structure import STRUCTURE_STD, WITHOUT_SHEAR
 from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
 from tirelib.model.base import Coordinate, coordinates, values_of
-from tirelib.parameters import FIELDS, Number, TireFile
-from tirelib.threads import one_thread
-from tirelib.units import from_si
 from tirelib.waveforms import Waveforms, measure_waveforms
 
 WIDEST = 0.25

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.parameters import Tire
 from tirelib.model.base import Coordinate
-from tirelib.parameters import Tire
 from tirelib.ring.frequencies import natural_frequency, rim_stiffness
 
 SIDEWALL, MODAL, MASS, TREAD, GROWTH, SECTION = 0.03, 0.01, 0.03, 0.05, 0.05, 0.01

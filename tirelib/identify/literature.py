@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from tirelib.parameters import Number
+from tirelib.core.parameters import Number
 
 _LITERATURE: Mapping[str, tuple[float, float, str]] = {
     "bending_stiffness": (2.1, 0.5, "literature, Table 6-3: 1.57 to 4 N m^2"),

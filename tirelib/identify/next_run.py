@@ -18,9 +18,9 @@ from typing import Self
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import TirelibError
-from tirelib.forked import forked
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import TirelibError
+from tirelib.core.forked import forked
 from tirelib.identify.laboratory import Test, laboratory_tests
 from tirelib.identify.random_effects import scales, tangents, whitening_of
 from tirelib.identify.waveform_fit import WaveformFit

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.identify.random_effects import tangents
 from tirelib.identify.span import span
 from tirelib.waveforms import Waveforms

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.campaign import Tolerance
+from tirelib.core.arrays import FloatArray
 
 SMALLEST_TOLERANCE = 1e-4
 

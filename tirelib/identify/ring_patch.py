@@ -3,13 +3,13 @@
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.profiles import PressureProfile, parabola, sampled
 from tirelib.contact.radial import RadialContact, load
 from tirelib.contact.tread import Tread
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import Tire
 from tirelib.identify.force_data import ForceData
-from tirelib.parameters import Tire
 from tirelib.ring.compliance import Compliance, compliance
 from tirelib.ring.ring import Ring
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import linalg
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 KNOWN = 1e-5
 """Singular value, of columns of length one and over the largest, below which a direction is that of

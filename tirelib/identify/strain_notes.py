@@ -4,8 +4,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
 from tirelib.campaign import Campaign, RunPlan
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.waveforms import Waveforms
 
 WEAK_GAGE = 0.3

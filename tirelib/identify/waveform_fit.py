@@ -13,9 +13,9 @@ from functools import partial
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.errors import TirelibError
-from tirelib.forked import forked
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import TirelibError
+from tirelib.core.forked import forked
 from tirelib.identify.campaign_data import Data
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.waveform_problem import MISFIT, WaveformProblem, WaveformSolved

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import Data, begins_with
 from tirelib.identify.delay import STD, UNIT, by_delay, earlier

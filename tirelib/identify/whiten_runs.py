@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 from scipy import linalg
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.identify.campaign_data import Data
 from tirelib.identify.random_effects import Whitening, scales, tangents, whitening_of
 

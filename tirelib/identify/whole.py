@@ -6,14 +6,14 @@ from typing import Any
 
 from tirelib import __version__
 from tirelib.campaign import Campaign
-from tirelib.errors import CalibrationError, TirelibError
+from tirelib.core.errors import CalibrationError, TirelibError
+from tirelib.core.parameters import Number, Tire, TireFile
+from tirelib.core.threads import one_thread
 from tirelib.identify.brush_model import STORED
 from tirelib.identify.document import model_file
 from tirelib.identify.forces import ForceIdentification, identify_forces
 from tirelib.identify.identify import Identification, identify
 from tirelib.identify.strain_notes import broken_gages, ring_expected
-from tirelib.parameters import Number, Tire, TireFile
-from tirelib.threads import one_thread
 
 SAME_RADIUS = 0.01
 """Relative difference up to which two free radii may be one tire's."""

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import optimize
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 
 def bounded_step(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.infer.hypothesis import Hypothesis, plain_tires, products
 from tirelib.infer.problem import Problem
 

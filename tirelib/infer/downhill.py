@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import TirelibError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import TirelibError
 from tirelib.infer.problem import Model, Point
 from tirelib.infer.quadratic import Quadratic
 

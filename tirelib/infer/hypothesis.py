@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.infer.null import OWN, PRIOR, Null, Products
 from tirelib.infer.plain import BASE, ROUGHLY, Family, View
 from tirelib.infer.posterior import Posterior

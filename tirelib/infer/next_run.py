@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.null import Null
 from tirelib.infer.plain import View

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 LEAST = 1e-11
 """Variance that stands for none: so little that no sample tells it from zero."""

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.infer.normal import Weighed, beside, taken
 from tirelib.infer.plain import BASE, LARGEST, ROUGHLY, Family, View
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.infer.normal import Normal, Weighed
 
 ROUNDS = 60

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError
 from tirelib.effects import Effect
-from tirelib.errors import ConvergenceError
 from tirelib.infer.downhill import Whiten, downhill
 from tirelib.infer.normal import LEAST, Normal, Weighed
 from tirelib.infer.plain import BASE, ROUGHLY, View

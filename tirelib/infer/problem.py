@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.effects import Effect
 
 

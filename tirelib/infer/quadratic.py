@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.infer.bounded import bounded_step
 from tirelib.infer.normal import Normal, Weighed
 from tirelib.infer.plain import BASE

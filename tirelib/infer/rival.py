@@ -11,7 +11,7 @@ about the two fits.
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.infer.hypothesis import Hypothesis, law_errors, plain_tires, products
 from tirelib.infer.plain import BASE, Family
 from tirelib.infer.posterior import Posterior

@@ -20,15 +20,15 @@ from typing import Any
 
 import numpy as np
 
+from tirelib.core.errors import ParameterError, TirelibError
+from tirelib.core.forked import forked
+from tirelib.core.threads import one_thread
 from tirelib.effects import Effect
-from tirelib.errors import ParameterError, TirelibError
-from tirelib.forked import forked
 from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.plain import Family, pooled
 from tirelib.infer.posterior import ROUGH, ROUNDS, Posterior, posterior, sizes_at_start
 from tirelib.infer.problem import Point, Problem
 from tirelib.infer.rival import p_against
-from tirelib.threads import one_thread
 
 SINGLES, PARTNERS, LEADERS = 6, 3, 2
 """Hypotheses that are fitted exactly: single effects, partners of each leader, and leaders."""

@@ -5,11 +5,11 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.free_boundary import Start
+from tirelib.core.arrays import FloatArray
+from tirelib.core.parameters import FIELDS, Tire
 from tirelib.model.chain import Changes, waveform
 from tirelib.model.state import Operating, State
-from tirelib.parameters import FIELDS, Tire
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID, Waveforms
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.brush.predict import PointConditions, PointForces, PointParameters
 from tirelib.brush.shaped import predict_shaped
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

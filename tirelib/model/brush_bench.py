@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.brush.predict import PointParameters
+from tirelib.core.arrays import FloatArray
 from tirelib.effects import Effect
 from tirelib.model.brush import BrushConditions, brush_forces, brush_state
 

@@ -10,8 +10,8 @@ so that the balance with the carcass is not solved again.
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.brush.predict import PointForces
+from tirelib.core.arrays import FloatArray
 from tirelib.model.brush import BrushState, brush_forces
 
 STEP = 1e-6

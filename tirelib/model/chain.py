@@ -11,9 +11,9 @@ from itertools import takewhile
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact import radial
-from tirelib.errors import ConvergenceError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError
 from tirelib.model.state import CONSTANTS, State
 from tirelib.ring.compliance import compliance
 from tirelib.signal import LowPass

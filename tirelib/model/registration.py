@@ -13,14 +13,14 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.linalg import subspace_angles
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import FormatError, TirelibError
+from tirelib.core.parameters import Tire, read_tire
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.effects.effect import Strength
 from tirelib.effects.load import all_effects
-from tirelib.errors import FormatError, TirelibError
 from tirelib.model.brush_bench import BrushBench
 from tirelib.model.strain_bench import Plan, StrainBench, reference_plan
-from tirelib.parameters import Tire, read_tire
 
 TWIN = 30.0
 """Angle below which two effects are twins, [deg]."""

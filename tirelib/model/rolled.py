@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.model.state import Operating
 from tirelib.rolling.assemble import Unknowns, by_element, changed, differ, fields
 from tirelib.rolling.constants import Constants

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.model.base import Coordinate, smoothed
 from tirelib.model.chain import Change, Changes, Course, course, filtered, strained
 from tirelib.model.rolled import STEP, RolledSlopes, rolled_slopes

@@ -12,9 +12,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.free_boundary import Start
-from tirelib.errors import ConvergenceError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError
 from tirelib.model.base import smoothed
 from tirelib.model.chain import (
     FIRST_DEPTH,

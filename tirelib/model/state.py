@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.free_boundary import Start
 from tirelib.contact.radial import RadialContact
 from tirelib.contact.tread import Tread
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.ring.ring import ComplexArray, Ring
 
 

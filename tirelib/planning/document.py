@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tirelib.compare.forces import UNITS
+from tirelib.core.quantities import QUANTITIES
 from tirelib.diagnose.diagnose import FALSE_ALARM
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.models import plain_tires
@@ -17,7 +18,6 @@ from tirelib.planning.envelope import AXES, Envelope
 from tirelib.planning.next_test import gains, next_test
 from tirelib.planning.suspects import Suspects, suspects_of
 from tirelib.problems.strain import StrainProblem
-from tirelib.quantities import QUANTITIES
 
 FORMAT = "tirelib-next-test/1"
 PROMISING = 0.5

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
+from tirelib.core.quantities import QUANTITIES, Quantity
 from tirelib.model.state import Operating
 from tirelib.planning.sweep import Sweep
-from tirelib.quantities import QUANTITIES, Quantity
 
 Range = tuple[float, float]
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.compare.force_model import ForceModel
+from tirelib.core.arrays import FloatArray
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.identify.force_bench import ForceBench
 from tirelib.identify.force_data import ForceData

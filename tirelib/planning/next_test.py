@@ -4,9 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
 from tirelib.compare.force_model import ForceModel
-from tirelib.errors import ParameterError, TirelibError
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import ParameterError, TirelibError
+from tirelib.core.threads import one_thread
 from tirelib.infer.hypothesis import Hypothesis
 from tirelib.infer.next_run import Ahead, next_runs
 from tirelib.infer.problem import Point
@@ -26,7 +27,6 @@ from tirelib.planning.force_runs import bench_ahead
 from tirelib.planning.suspects import Suspects
 from tirelib.problems.forces import ForceProblem
 from tirelib.problems.strain import StrainProblem
-from tirelib.threads import one_thread
 
 PLAN_REPEATS = (1, 2, 3, 4, 6, 8, 12)
 """Times that the whole plan is measured."""

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
+from tirelib.core.threads import one_thread
 from tirelib.diagnose.diagnose import FALSE_ALARM, plain_tires, twins_of
 from tirelib.effects import Effect
-from tirelib.errors import ParameterError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.chance import Plans
 from tirelib.infer.select import Hypotheses
 from tirelib.problems.strain import StrainProblem
-from tirelib.threads import one_thread
 
 RATIOS = (1.05, 1.2, 1.5)
 """Error with the planted effect, over the error without."""

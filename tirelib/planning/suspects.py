@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.effects import Effect
-from tirelib.errors import ParameterError
 
 MOST_SUSPECTS = 3
 """Suspects taken at most."""

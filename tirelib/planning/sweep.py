@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.errors import ParameterError
 from tirelib.identify.force_points import CELL_ANGLE, CELL_RATIO, ForcePoints, set_points
 
 FEWEST_SLIPS = 4

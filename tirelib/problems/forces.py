@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.errors import TirelibError
 from tirelib.effects import Effect
-from tirelib.errors import TirelibError
 from tirelib.identify.brush_law import SPECS
 from tirelib.identify.discrepancy import bumps
 from tirelib.identify.force_bench import Changes, ForceBench

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.effects import Effect
 from tirelib.identify.campaign_data import StraightRuns, begins_with
 from tirelib.identify.delay import STD, UNIT, by_delay, earlier

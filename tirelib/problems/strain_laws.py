@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.parameters import FIELDS
 from tirelib.identify.discrepancy import (
     REFERENCE_LOAD,
     REFERENCE_OMEGA,
@@ -14,7 +15,6 @@ from tirelib.identify.discrepancy import (
 )
 from tirelib.model.base import Coordinate
 from tirelib.model.state import Operating, State
-from tirelib.parameters import FIELDS
 from tirelib.waveforms import GRID
 
 SHAPES = Discrepancy(inside=1.0, outside=0.15, by_load=1.0, by_pressure=1.0, by_speed=1.0)

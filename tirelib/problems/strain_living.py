@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.effects import Effect
-from tirelib.errors import ParameterError
 from tirelib.model.base import coordinates
 from tirelib.model.state import Operating
 

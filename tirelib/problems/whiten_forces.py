@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray
 
 LENGTH = 0.7
 """Length over which a block's own misfit is correlated, in arcsinh of C slip / (mu Fz)."""

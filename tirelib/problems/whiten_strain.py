@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.model.state import Operating
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.estimators.calibration import Estimates
 from tirelib.observations import Observations, mean_by
 

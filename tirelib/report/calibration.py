@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.cornering import CorneringTrend
 from tirelib.estimators.train import Trained
 from tirelib.report import figures

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from tirelib.campaign.model import CampaignHeader, FloatArray, Run
 from tirelib.campaign.overview import COLUMNS, Quantity, RunRow, place_label
 from tirelib.campaign.turns import trigger_samples, turn_samples
+from tirelib.core.units import from_si
 from tirelib.report.style import new_figure
-from tirelib.units import from_si
 
 _BY_NAME = {column.name: column for column in COLUMNS}
 _LABEL = {

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from math import isnan
 from pathlib import Path
 
+from tirelib.core.flags import flag_names
 from tirelib.estimators.calibration import Calibration, Estimates
-from tirelib.flags import flag_names
 from tirelib.observations import Observations
 from tirelib.report import figures
 from tirelib.report.accuracy import QUANTITIES, TITLE, Accuracy, accuracies

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.dissertation import Means
 from tirelib.report.style import signed_degrees
 

@@ -6,11 +6,11 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.quantities import QUANTITIES
 from tirelib.planning.criterion import NOTHING, NextTest, PairForecast
 from tirelib.planning.document import PROMISING, STRUCTURE, Plan, advice, plan_document
 from tirelib.planning.envelope import AXES
-from tirelib.quantities import QUANTITIES
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import Table, number, numbers
 from tirelib.report.parts_page import Part, write_parts_page

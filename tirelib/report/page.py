@@ -10,7 +10,7 @@ from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, S
 from matplotlib.figure import Figure
 
 from tirelib import __version__
-from tirelib.errors import TirelibError
+from tirelib.core.errors import TirelibError
 from tirelib.report.style import AXES_NAME, save
 
 DASH = "\N{EN DASH}"

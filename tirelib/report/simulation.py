@@ -11,14 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact import radial, shear
 from tirelib.contact.free_boundary import ComplianceAt
 from tirelib.contact.radial import RadialContact
 from tirelib.contact.shear import ShearContact
 from tirelib.contact.tread import Tread
-from tirelib.errors import ParameterError
-from tirelib.parameters import FIELDS, Tire
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import FIELDS, Tire
+from tirelib.core.threads import one_thread
+from tirelib.core.units import from_si
 from tirelib.report.simulation_peaks import Peaks, extreme, find_peaks
 from tirelib.report.simulation_series import (
     FINE_ANGLES_PER_ANGLE,
@@ -32,8 +34,6 @@ from tirelib.report.simulation_series import (
 from tirelib.ring.compliance import Compliance, compliance
 from tirelib.ring.ring import ComplexArray, Ring
 from tirelib.strain.innerliner import strain_harmonics
-from tirelib.threads import one_thread
-from tirelib.units import from_si
 
 CONTACTS = ("radial", "shear")
 N_SHEAR_NODES = 80

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tirelib.arrays import FloatArray
-from tirelib.documents import new_file
+from tirelib.core.arrays import FloatArray
+from tirelib.core.documents import new_file
 from tirelib.report.simulation import MICRO, Simulation
 
 FORMAT = "tirelib-simulation/1"

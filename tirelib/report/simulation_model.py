@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.compare.model import Model
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError, ParameterError
+from tirelib.core.parameters import FIELDS, Tire
+from tirelib.core.threads import one_thread
 from tirelib.model.base import predict
 from tirelib.model.solution import Solution, solved
 from tirelib.model.state import Operating, State
-from tirelib.parameters import FIELDS, Tire
 from tirelib.report.simulation import (
     N_ANGLES,
     Simulation,
@@ -25,7 +26,6 @@ from tirelib.report.simulation import (
 )
 from tirelib.ring.ring import ComplexArray
 from tirelib.signal import LowPass
-from tirelib.threads import one_thread
 
 TURN = np.linspace(-np.pi, np.pi, N_ANGLES - 1, endpoint=False)
 """Angles of the curves, the last of which is the first; every fourth is one of `GRID`."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,9 @@ with many.
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.shear import ShearContact
-from tirelib.parameters import Tire
+from tirelib.core.arrays import FloatArray
+from tirelib.core.parameters import Tire
 from tirelib.ring.compliance import Compliance
 from tirelib.ring.ring import ComplexArray
 

@@ -18,7 +18,7 @@ from tirelib.campaign import (
     Tolerance,
     write_campaign,
 )
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.rig.hidden import hidden
 from tirelib.rig.measure import MeasuringChain, Recording, Stage, record, settle, slip_ratio
 from tirelib.rig.mesh import mesh

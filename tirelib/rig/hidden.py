@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.rig import shown
 from tirelib.rig.laws import (
     LossModulus,

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.rig.ramp import Nominal, Point, Ramp, changed
 from tirelib.rig.tire import Condition
 

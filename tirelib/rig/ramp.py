@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.rig.tire import Condition
 
 STEPS = {

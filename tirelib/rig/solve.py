@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.errors import ParameterError, TirelibError
+from tirelib.core.errors import ParameterError, TirelibError
+from tirelib.core.threads import one_thread
 from tirelib.rig.belt import FIELDS, U
 from tirelib.rig.mesh import Mesh, mesh
 from tirelib.rig.system import Balance, balance
 from tirelib.rig.tire import NEW_DEPTH, Array, Condition, RigTire
-from tirelib.threads import one_thread
 
 TOLERANCE = 1e-9
 """Largest Newton step of a solved state: metres and radians."""

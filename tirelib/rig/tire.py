@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 if TYPE_CHECKING:
     from tirelib.rig.laws import BeltLaw, RoadLaw

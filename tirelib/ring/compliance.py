@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import ParameterError
 from tirelib.ring.ring import (
     FREE,
     ComplexArray,

@@ -14,8 +14,8 @@ Frequencies are angular, in rad/s.
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.ring.green import positive, whole_orders
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtri, stdtrit
 
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.ring.frequencies import not_negative
 from tirelib.ring.green import positive, whole_orders
 

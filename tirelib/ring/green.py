@@ -18,8 +18,8 @@ Validity: small rotations, no stretch, no tangential springs, no pretension, no 
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError, ShapeError
 
 _BLOCK = 256
 

@@ -43,9 +43,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError
-from tirelib.parameters import Tire
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import Tire
 from tirelib.ring.ring import ComplexArray, columns
 
 _MAY_BE_ZERO = frozenset({"tension", "mass", "damping"})

@@ -20,9 +20,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError
-from tirelib.parameters import Tire
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import Tire
 
 ComplexArray = npt.NDArray[np.complex128]
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.rolling import belt, road
 from tirelib.rolling.constants import Constants
 from tirelib.rolling.mesh import Mesh, Points

@@ -18,7 +18,7 @@ sidewall may soften: its radial force is k_u (exp(c u) - 1) / c, whose tangent i
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.rolling.constants import Constants
 
 Fields = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import ParameterError
 
 _POSITIVE = frozenset(
     {"radius", "free_radius", "EA", "GA", "EI", "mass", "k_t", "thickness", "half_width", "load"}

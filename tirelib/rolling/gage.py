@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.rolling import belt
 from tirelib.rolling.constants import Constants
 from tirelib.rolling.mesh import to_grid, to_grid_slope

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 ORDER = 3
 PATCH = 0.6

@@ -34,7 +34,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.rolling.constants import Constants
 
 SLIDING_STIFFNESS = 0.01

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import lapack
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ConvergenceError, ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.rolling.assemble import (
     BAND,
     BORDER,

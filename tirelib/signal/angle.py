@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial.polynomial import polyval
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.signal.course import Course
 
 SOURCES = ("omega", "speed")

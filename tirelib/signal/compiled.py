@@ -1,12 +1,12 @@
-"""Turns cut by the compiled core, see `tirelib.core`."""
+"""Turns cut by the compiled core, see `tirelib.core.compiled`."""
 
 import ctypes as c
 from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.core import (
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.compiled import (
     TURN_ROWS,
     TURN_SCALARS,
     Core,
@@ -15,8 +15,8 @@ from tirelib.core import (
     block_of,
     columns_of,
 )
-from tirelib.errors import ParameterError
-from tirelib.held import HELD, Held
+from tirelib.core.errors import ParameterError
+from tirelib.core.held import HELD, Held
 from tirelib.signal.lowpass import LowPass
 from tirelib.signal.turn import PHI, Turns, turns_of
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 RISE = 0.7
 """Level of the pulse's edges, as a fraction from the lowest to the highest strain of a turn."""

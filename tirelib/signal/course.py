@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 DEGREE = 3
 """Highest degree: braking may begin and end within one turn."""

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 
 HALF_POWER = float(np.sqrt(np.log(2.0)))
 """Product of cut-off (rad per rad) and sigma (rad) at half power."""

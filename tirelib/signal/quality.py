@@ -6,8 +6,8 @@ gage then carries a flag for the turn. Anything longer makes the gage invalid fo
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.flags import TurnFlag
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.flags import TurnFlag
 
 LONGEST_BRIDGE = 2
 """Samples in a row that a straight line may replace."""

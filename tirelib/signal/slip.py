@@ -20,7 +20,7 @@ what acts differently there. Two things are seen in the contact itself:
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.signal.turn import PHI
 
 RADIUS_SHARE = 0.5 / np.sqrt(3.0)

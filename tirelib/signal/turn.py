@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray, IntArray
-from tirelib.traces import Conditions, StrainTrace
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.traces import Conditions, StrainTrace
 
 PHI = np.linspace(-1.0, 0.8, 361)
 """Wheel-angle grid of a turn, [rad]; zero is the middle of the centre gage's pulse."""

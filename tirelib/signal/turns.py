@@ -20,11 +20,11 @@ from typing import Unpack
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.core import loaded_core, memory
-from tirelib.errors import ParameterError, ShapeError
-from tirelib.flags import TurnFlag
-from tirelib.held import HELD, Held
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.compiled import loaded_core, memory
+from tirelib.core.errors import ParameterError, ShapeError
+from tirelib.core.flags import TurnFlag
+from tirelib.core.held import HELD, Held
 from tirelib.signal.angle import SOURCES, AngleLaw, Past, angle_law, minmod
 from tirelib.signal.compiled import Record, cut_by_core
 from tirelib.signal.contacts import NEAR_EDGE, Contact, ContactFinder
@@ -489,7 +489,7 @@ def cut_turns(
 ) -> Turns:
     """Cut a whole record into turns; parameters as in `TurnCutter` and its `push`.
 
-    The compiled core cuts, where there is one for this machine (`tirelib.core`).
+    The compiled core cuts, where there is one for this machine (`tirelib.core.compiled`).
 
     Raises
     ------

@@ -20,9 +20,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import solve_banded
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.static import LARGEST_DEFLECTION, road_gap
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError, ShapeError
 
 SMALLEST_EIGENVALUE = 0.05
 """Smallest eigenvalue of u + u'' on the arc; an error of the strain grows by its inverse."""

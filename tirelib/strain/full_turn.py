@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.strain.deformation import check_belt
 
 

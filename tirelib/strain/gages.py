@@ -18,16 +18,16 @@ from typing import Literal
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.fourier import evaluate
 from tirelib.contact.layout import StripContact
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError, ShapeError
+from tirelib.core.traces import Conditions, StrainTrace
 from tirelib.ring.ring import ComplexArray
 from tirelib.signal.contacts import RISE
 from tirelib.signal.lowpass import LowPass
 from tirelib.signal.turns import OFFSET_HALF_WIDTH, PHI
 from tirelib.strain.innerliner import strain_harmonics
-from tirelib.traces import Conditions, StrainTrace
 
 PULSE_POINTS = 1440
 """Points of the turn at which the pulse is searched; its edges lie between them."""

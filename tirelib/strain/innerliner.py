@@ -11,8 +11,8 @@ stretch adds its membrane strain, one that can shear bends by beta instead of th
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.fourier import evaluate
+from tirelib.core.arrays import FloatArray
 from tirelib.ring.ring import ComplexArray
 
 

@@ -38,11 +38,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
 from tirelib.contact.fourier import load_harmonics
 from tirelib.contact.layout import StripContact
-from tirelib.errors import ParameterError, ShapeError
-from tirelib.parameters import Tire
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError, ShapeError
+from tirelib.core.parameters import Tire
 from tirelib.ring.ring import ComplexArray
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.signal.contacts import JUMP, ContactFinder
 from tirelib.signal.turns import TurnCutter
 

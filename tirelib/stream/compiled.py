@@ -1,4 +1,4 @@
-"""The streaming estimator of the compiled core, see `tirelib.core`."""
+"""The streaming estimator of the compiled core, see `tirelib.core.compiled`."""
 
 import ctypes as c
 from base64 import b64decode, b64encode
@@ -7,8 +7,8 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.core import (
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.compiled import (
     EstimateStruct,
     FeatureStruct,
     OutputStruct,
@@ -17,13 +17,13 @@ from tirelib.core import (
     columns_of,
     memory,
 )
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
+from tirelib.core.flags import TurnFlag
+from tirelib.core.held import HELD, Held
 from tirelib.estimators.compiled import core_calibration, estimates_of
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.features.compiled import attributes_of
 from tirelib.features.extract import Features
-from tirelib.flags import TurnFlag
-from tirelib.held import HELD, Held
 from tirelib.signal.compiled import beyond_samples
 from tirelib.signal.turns import check_gages
 from tirelib.stream.estimate import TurnEstimate

@@ -4,11 +4,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, Self, Unpack
 
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.errors import FormatError, ParameterError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import FormatError, ParameterError
+from tirelib.core.held import Held
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.compiled import core_calibration
-from tirelib.held import Held
 from tirelib.stream.estimate import TurnEstimate
 
 __all__ = ["RATES", "STANDSTILL", "WATCHDOG_TURNS", "StreamEstimator", "TurnEstimate"]

@@ -6,11 +6,11 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.flags import TurnFlag
+from tirelib.core.held import HELD, Held
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.features.extract import reference_features
-from tirelib.flags import TurnFlag
-from tirelib.held import HELD, Held
 from tirelib.signal.lowpass import LowPass
 from tirelib.signal.quality import UNUSABLE
 from tirelib.signal.turns import LONGEST_TURN, Turn, TurnCutter, stack_turns

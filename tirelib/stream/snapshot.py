@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.estimators.calibration import Estimates
 from tirelib.features.extract import Features
 from tirelib.signal.contacts import Contact, ContactFinder

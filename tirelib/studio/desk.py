@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.studio import intake
 from tirelib.studio.commands import FIRST, planted
 from tirelib.studio.disk import move_into, read_document, write_document
@@ -86,7 +86,7 @@ class Desk:
         """Open a campaign that the command line names; return its address on the page."""
         opened = self.session.open(folder)
         if model_file is not None:
-            from tirelib.parameters import read_tire
+            from tirelib.core.parameters import read_tire
 
             read_tire(str(model_file))  # a file that is no model is refused here
             model = opened.new_model(None, "identify", "", "")

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, Any
 
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 _UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.studio.disk import safe_name
 
 MOST_BYTES = 2 << 30

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 
 def packed(file: Path) -> bytes:

@@ -12,12 +12,12 @@ import tomli_w
 from tirelib.campaign.check_gages import PLAUSIBLE_STRAIN
 from tirelib.campaign.check_rig import LOADED, PLAUSIBLE
 from tirelib.campaign.importing.mapreader import FORMAT as MAP_FORMAT
-from tirelib.errors import FormatError, ParameterError
+from tirelib.core.errors import FormatError, ParameterError
+from tirelib.core.units import QUANTITIES, dimension_of, from_si, units_of
 from tirelib.studio import intake
 from tirelib.studio.disk import read_document, safe_name, write_atomic
 from tirelib.studio.jobs import Job, Jobs
 from tirelib.studio.session import Session
-from tirelib.units import QUANTITIES, dimension_of, from_si, units_of
 
 
 class Receiving:

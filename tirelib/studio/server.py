@@ -15,7 +15,7 @@ from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from tirelib.errors import FormatError, ParameterError, TirelibError
+from tirelib.core.errors import FormatError, ParameterError, TirelibError
 from tirelib.studio import intake, state
 from tirelib.studio.desk import Desk
 from tirelib.studio.pack import packed

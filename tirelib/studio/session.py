@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.studio.disk import read_document, safe_name, write_atomic
 
 FORMAT = "tirelib-studio/1"

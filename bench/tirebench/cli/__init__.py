@@ -5,7 +5,7 @@ import click
 from tirebench.errors import BenchError
 from tirelib import __version__
 from tirelib.cli import Verbs, run_program
-from tirelib.errors import TirelibError
+from tirelib.core.errors import TirelibError
 
 VERBS = {
     "ports": "List serial ports: device, description, identity.",

@@ -21,8 +21,8 @@ from tirebench.recording.link import ReplayLink
 from tirebench.setup.source_plan import SourcePlan, wheels_of
 from tirebench.wire.device import Device
 from tirebench.wire.timeline import Samples
-from tirelib.arrays import FloatArray
 from tirelib.cli.common import NEW_FILE, output
+from tirelib.core.arrays import FloatArray
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 NOBODY = 30.0

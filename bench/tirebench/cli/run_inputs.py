@@ -21,8 +21,8 @@ from tirebench.setup.setup_file import check_sources, read_setup
 from tirebench.setup.source_plan import SourcePlan, protocol_of
 from tirebench.wire.conditions import QUANTITIES, Conditions, read_conditions
 from tirebench.wire.device import Device
+from tirelib.core.units import to_si
 from tirelib.estimators.calibration import Calibration
-from tirelib.units import to_si
 
 LOOK = 0.05
 """Time between two looks for a file that is waited for, [s]."""

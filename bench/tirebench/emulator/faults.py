@@ -28,7 +28,7 @@ import numpy as np
 
 from tirebench.errors import DeviceError
 from tirebench.wire.frames import GAGES, HIGHEST, LOWEST, Int16Array
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 RATES = {"flips": 0.01, "cuts": 0.01, "inserts": 0.01, "lost": 0.01, "dup": 0.01, "nan": 0.001}
 """Random faults, with their default rates."""

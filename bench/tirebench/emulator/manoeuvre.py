@@ -31,13 +31,13 @@ from typing import Any
 import numpy as np
 
 from tirebench.errors import DeviceError, cause
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.units import from_si, to_si
 from tirelib.rig.measure import MeasuringChain, gages
 from tirelib.rig.observe import forces, trace
 from tirelib.rig.ramp import Point, dense
 from tirelib.rig.solve import LIMITS, State, solve
 from tirelib.rig.tire import TIRES, Condition, RigTire
-from tirelib.units import from_si, to_si
 
 FORMAT = "tirebench-manoeuvre/1"
 COLUMNS: Mapping[str, tuple[str, str, str]] = {

@@ -15,8 +15,8 @@ import numpy as np
 from tirebench.estimator.wheels import Block
 from tirebench.wire.conditions import ROUNDING, UNKNOWN, Condition, Conditions, Held
 from tirebench.wire.timeline import Samples
-from tirelib.arrays import BoolArray, FloatArray, IntArray
-from tirelib.flags import TurnFlag
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.flags import TurnFlag
 
 Outputs = tuple[Mapping[str, float], Mapping[str, str]]
 """Numbers (SI) and texts that an estimator gives at the end of a turn."""

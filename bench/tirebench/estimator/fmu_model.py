@@ -27,9 +27,9 @@ from tirebench.estimator.chain import Outputs
 from tirebench.estimator.fmu_archive import FmuArchive
 from tirebench.wire.conditions import Condition
 from tirebench.wire.frames import GAGES, MOST_GAGES
-from tirelib.arrays import FloatArray
-from tirelib.errors import FormatError
-from tirelib.held import HELD
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import FormatError
+from tirelib.core.held import HELD
 
 if TYPE_CHECKING:
     from tirelib.estimators.calibration import Calibration

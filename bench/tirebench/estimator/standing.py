@@ -7,7 +7,7 @@ import numpy as np
 
 from tirebench.errors import DeviceError
 from tirebench.wire.timeline import Samples
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 EVERY = 0.25
 """Length of a block, [s]."""

@@ -17,7 +17,7 @@ from typing import Any
 from tirebench.errors import FmuError
 from tirebench.estimator.fmu_archive import FmuArchive, read_fmu
 from tirebench.owned import prefix
-from tirelib.errors import TirelibError
+from tirelib.core.errors import TirelibError
 
 FOLDER = "tirebench"
 LIST = "trusted_fmus"

@@ -5,8 +5,8 @@ from typing import Any
 
 from tirebench.estimator.wheels import Wheel
 from tirebench.wire.conditions import UNITS, Conditions
-from tirelib.held import HELD
-from tirelib.units import from_si
+from tirelib.core.held import HELD
+from tirelib.core.units import from_si
 
 ALWAYS = ("speed", "pressure", "camber")
 """Shown also where they are not known."""

@@ -16,7 +16,7 @@ from tirebench.estimator.session import Source
 from tirebench.estimator.standing import EVERY, Level, standing_mean
 from tirebench.wire.device import Device
 from tirebench.wire.gage_setup import apparent_strain, shunted, write_device, zeroed
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 MEAN_SECONDS = 3.0
 """The mean is taken over the last so many seconds, [s]."""

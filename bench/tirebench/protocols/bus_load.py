@@ -18,7 +18,7 @@ from tirebench.protocols.layouts import LAYOUTS, RAW12, RAW12C, RAW16
 from tirebench.protocols.transmitter import SERIAL, CanTransmitter, Record
 from tirebench.wire.can_batch import FD_LENGTHS, CanBatch
 from tirebench.wire.frames import GAGES, SAMPLES, frame_size
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 
 HIGHEST_MEAN = 0.8
 """A bus above this mean load delays its frames."""

@@ -9,7 +9,7 @@ from tirebench.protocols.signals import Signal
 from tirebench.wire.conditions import TELLABLE, Measured
 from tirebench.wire.device import Device
 from tirebench.wire.frames import GAGES
-from tirelib.units import to_si
+from tirelib.core.units import to_si
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ import numpy as np
 
 from tirebench.wire.can_batch import ByteArray
 from tirebench.wire.frames import IntArray
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 _ANYBODY = "Vector__XXX"
 """The DBC format's own word where a signal names no receiver."""

@@ -12,7 +12,7 @@ from tirebench.protocols.layouts import COUNTER_RANGE, decode_raw12c, decode_syn
 from tirebench.wire.can_batch import ByteArray
 from tirebench.wire.frames import Frames, Int16Array, IntArray
 from tirebench.wire.line_counts import LineCounts
-from tirelib.arrays import BoolArray
+from tirelib.core.arrays import BoolArray
 
 LONGEST_WAIT = 2**16
 """Samples that wait for a SYNC; then they are dropped."""

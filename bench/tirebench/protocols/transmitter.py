@@ -38,7 +38,7 @@ from tirebench.wire.frames import (
     encode,
     strain_frames,
 )
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 SERIAL = "serial"
 FORMATS = (SERIAL, RAW16, RAW12, RAW12C)

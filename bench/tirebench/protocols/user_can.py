@@ -16,7 +16,7 @@ from tirebench.wire.can_batch import CanBatch
 from tirebench.wire.conditions import Measured
 from tirebench.wire.frames import CountArray, Frames
 from tirebench.wire.line_counts import LineCounts
-from tirelib.arrays import BoolArray
+from tirelib.core.arrays import BoolArray
 
 
 class UserCan:

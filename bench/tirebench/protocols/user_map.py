@@ -60,8 +60,8 @@ from tirebench.protocols.signals import Signal
 from tirebench.wire.conditions import HOLD, TELLABLE
 from tirebench.wire.device import Device
 from tirebench.wire.frames import MOST_GAGES
-from tirelib.errors import TirelibError
-from tirelib.units import to_si
+from tirelib.core.errors import TirelibError
+from tirelib.core.units import to_si
 
 FORMAT = "tirebench-map/1"
 LONGEST_SIGNAL = 32

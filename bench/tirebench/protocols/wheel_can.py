@@ -11,7 +11,7 @@ from tirebench.protocols.widening import Widener
 from tirebench.wire.can_batch import CanBatch
 from tirebench.wire.frames import TICK, FrameFlag, Frames, IntArray
 from tirebench.wire.line_counts import LineCounts
-from tirelib.arrays import BoolArray
+from tirelib.core.arrays import BoolArray
 
 _DECODE = {RAW16: layouts.decode_raw16, RAW12: layouts.decode_raw12}
 _CODES = {kind: code for code, kind in enumerate(LAYOUTS)}

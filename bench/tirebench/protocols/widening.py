@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirebench.wire.frames import IntArray
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 
 @dataclass(slots=True)

@@ -15,8 +15,8 @@ from tirebench.estimator.wheels import Wheels
 from tirebench.wire.conditions import RunMark
 from tirebench.wire.line_counts import LineCounts
 from tirebench.wire.timeline import TimelineCounts
+from tirelib.core.flags import flag_names
 from tirelib.estimators.edge import EDGE_UNIT, FORMAT, VARIED
-from tirelib.flags import flag_names
 
 if TYPE_CHECKING:
     from tirelib.estimators.calibration import Calibration

@@ -21,10 +21,10 @@ from tirebench.recording.segments import Segment
 from tirebench.wire.can_batch import CanBatch, unpack
 from tirebench.wire.conditions import QUANTITIES, ROUNDING, Condition, Conditions, RunMark
 from tirebench.wire.line_counts import LineCounts
-from tirelib.arrays import FloatArray
 from tirelib.campaign import CampaignHeader, Run, RunPlan, write_campaign
-from tirelib.held import HELD
-from tirelib.units import from_si
+from tirelib.core.arrays import FloatArray
+from tirelib.core.held import HELD
+from tirelib.core.units import from_si
 
 SHORTEST_RUN = 0.05
 """A segment shorter than this becomes no run of a campaign, [s]."""

@@ -16,7 +16,7 @@ from tirebench.recording.new_file import whole
 from tirebench.recording.recording import Recording
 from tirebench.recording.segments import Segment
 from tirebench.recording.topics import ESTIMATE, EVENTS
-from tirelib.units import from_si
+from tirelib.core.units import from_si
 
 Rows = dict[str, list[Any]]
 _ESTIMATED = (

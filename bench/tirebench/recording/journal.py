@@ -15,7 +15,7 @@ from tirebench.errors import RecordingError, cause
 from tirebench.estimator.chain import Turn
 from tirebench.recording.document import QUANTITIES, empty_summary, turn_document
 from tirebench.recording.new_file import keep_recordings
-from tirelib.documents import plain
+from tirelib.core.documents import plain
 from tirelib.estimators.edge import FORMAT
 
 HEAD = f'{{"format": "{FORMAT}", "axes": "iso", "turns": [\n'

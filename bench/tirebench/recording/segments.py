@@ -10,7 +10,7 @@ from tirebench.recording.recording import Recording
 from tirebench.setup.source_plan import SourcePlan, wheels_of
 from tirebench.wire.conditions import QUANTITIES, Conditions
 from tirebench.wire.timeline import Samples
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 
 EVERY_WHEEL = tuple(range(256))
 

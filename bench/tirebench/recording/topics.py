@@ -17,7 +17,7 @@ from tirebench.wire.conditions import QUANTITIES as CONDITION_UNITS
 from tirebench.wire.conditions import Measured
 from tirebench.wire.frames import GAGES
 from tirebench.wire.timeline import Samples
-from tirelib.units import from_si
+from tirelib.core.units import from_si
 
 RAW, EVENTS, CONDITIONS, LINE = "/raw/{}", "/events", "/conditions", "/line"
 STRAIN, ESTIMATE, LINK, BUS_CONDITION = (

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tirebench.wire.frames import IntArray
-from tirelib.arrays import BoolArray
+from tirelib.core.arrays import BoolArray
 
 ByteArray = npt.NDArray[np.uint8]
 

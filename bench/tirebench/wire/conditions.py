@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from tirebench.errors import DeviceError, cause
-from tirelib.held import HELD
-from tirelib.units import from_si, to_si
+from tirelib.core.held import HELD
+from tirelib.core.units import from_si, to_si
 
 FORMAT = "tirebench-conditions/3"
 EARLIER_FORMATS = ("tirebench-conditions/1", "tirebench-conditions/2")
@@ -32,7 +32,7 @@ UNITS = {
     "tread_temperature": ("degC", "temperature"),
 }
 QUANTITIES = {name: UNITS[name] for name in HELD}
-"""Unit in files and dimension of each condition, in the order of `tirelib.held.HELD`."""
+"""Unit in files and dimension of each condition, in the order of `tirelib.core.held.HELD`."""
 TELLABLE = {
     **{name: (name, dimension) for name, (_, dimension) in QUANTITIES.items()},
     "temperature": ("tread_temperature", "temperature"),
@@ -58,7 +58,7 @@ LONGEST_MEMORY = 256
 UNKNOWN = (math.nan,) * len(HELD)
 
 Condition = tuple[float, ...]
-"""In the order of `tirelib.held.HELD`, SI; NaN where unknown."""
+"""In the order of `tirelib.core.held.HELD`, SI; NaN where unknown."""
 
 
 def condition(*values: float, **known: float) -> Condition:
@@ -166,7 +166,7 @@ class Measured:
     Attributes
     ----------
     name : str
-        One of `tirelib.held.HELD`.
+        One of `tirelib.core.held.HELD`.
     value : float, SI
     wheel : int or None
         For which it holds; None: for all.

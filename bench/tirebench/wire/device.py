@@ -39,7 +39,7 @@ from tirebench.wire.frames import (
     Int16Array,
     IntArray,
 )
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 
 FORMAT = "tirebench-device/1"
 _KNOWN = {

@@ -17,7 +17,7 @@ import numpy as np
 from tirebench.errors import DeviceError, cause
 from tirebench.wire.device import FORMAT, GAIN_RANGE, Device
 from tirebench.wire.frames import HIGHEST, LOWEST
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 
 def zeroed(device: Device, mean: FloatArray) -> Device:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from tirebench.wire.device import Device
 from tirebench.wire.frames import GAGES, TICK, FrameFlag, Frames, select
 from tirebench.wire.rate_check import PERIOD, RateCheck
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 
 LONGEST_FILL = 1.0
 """A gap up to this long is filled with NaN, [s]; a longer one begins a new segment."""

@@ -12,7 +12,8 @@ import numpy as np
 
 from cosim.vehicle14 import port
 from cosim.vehicle14.files import TIRE_FILE, usual_tires
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.threads import one_thread
 from tirelib.fmu.bundle import content_hash
 from tirelib.fmu.export import export
 from tirelib.fmu.handbook import page
@@ -20,7 +21,6 @@ from tirelib.fmu.parts import source_file
 from tirelib.fmu.reference import FOLDER, Reference
 from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.variables import Variable
-from tirelib.threads import one_thread
 
 MODEL = "VehicleModel"
 PARTS = ("__init__.py", "model.py", "parameters.py", "port.py", "run.py", "tire.py")

@@ -8,8 +8,8 @@ from cosim.vehicle14.model import Vehicle
 from cosim.vehicle14.parameters import VehicleParameters
 from cosim.vehicle14.tire import BrushTires, tires_of
 from tirelib.brush import predict
-from tirelib.errors import ParameterError
-from tirelib.parameters.tire_file import models_folder
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters.tire_file import models_folder
 
 TIRE_FILE = models_folder() / "vehicle14" / "tire.toml"
 

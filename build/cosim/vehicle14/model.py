@@ -20,7 +20,7 @@ from .parameters import GRAVITY, VehicleParameters
 from .tire import BrushTires
 
 if TYPE_CHECKING:
-    from tirelib.arrays import FloatArray
+    from tirelib.core.arrays import FloatArray
 
 POSITION, ANGLES, TRAVEL = slice(0, 3), slice(3, 6), slice(6, 10)
 VELOCITY, RATES, TRAVEL_RATE, SPIN = slice(10, 13), slice(13, 16), slice(16, 20), slice(20, 24)

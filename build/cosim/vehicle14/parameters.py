@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from tirelib.arrays import FloatArray
+    from tirelib.core.arrays import FloatArray
 
 WHEELS = ("FL", "FR", "RL", "RR")
 """Order of the wheels in every array."""

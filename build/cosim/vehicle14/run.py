@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from .model import Controls, Motion, Vehicle
 
 if TYPE_CHECKING:
-    from tirelib.arrays import FloatArray
+    from tirelib.core.arrays import FloatArray
 
 LONGEST = 1e-3
 """Longest step of the integration [s]."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from tirelib.arrays import FloatArray
+    from tirelib.core.arrays import FloatArray
 
 NOMINAL = 4000.0
 """Load that the constants refer to [N]."""

@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.train import averaging
 from tirelib.observations import Observations

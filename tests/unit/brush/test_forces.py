@@ -9,7 +9,7 @@ from tirelib.brush.forces import brush_distribution, brush_forces
 from tirelib.brush.parabola import aligning_moment, bristle_stiffness, lateral_force, sliding_angle
 from tirelib.brush.parameters import BrushParameters, Carcass
 from tirelib.contact.profiles import convex_concave, parabola, power_law, sampled
-from tirelib.errors import ConvergenceError, ParameterError, ShapeError
+from tirelib.core.errors import ConvergenceError, ParameterError, ShapeError
 
 MU, LOAD, A, STIFFNESS = 0.9, 4000.0, 0.06, 6e4
 CPY = STIFFNESS / (2 * A**2)

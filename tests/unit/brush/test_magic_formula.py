@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirelib.brush.magic_formula import fit_sine, lateral_curve, sine_curve
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 TRUE = {"C_alpha": 9e4, "D": 4200.0, "C": 1.4, "E": -0.5, "S_h": 0.002, "S_v": -40.0}
 

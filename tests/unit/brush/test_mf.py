@@ -8,7 +8,7 @@ import pytest
 from tirelib.brush.mf import magic_forces
 from tirelib.brush.mf_tire import Coefficients, MagicTire, magic_tire
 from tirelib.brush.tir import parse_tir
-from tirelib.errors import FormatError, ParameterError, ShapeError
+from tirelib.core.errors import FormatError, ParameterError, ShapeError
 
 HEAD = """[UNITS]
 LENGTH='meter'

@@ -23,8 +23,8 @@ from tirelib.brush.tir import read_tir
 from tirelib.cli import program
 from tirelib.compare.force_model import force_model_of
 from tirelib.compare.magic_points import model_points
-from tirelib.errors import CalibrationError, TirelibError
-from tirelib.parameters import Number, TireFile, write_tire
+from tirelib.core.errors import CalibrationError, TirelibError
+from tirelib.core.parameters import Number, TireFile, write_tire
 
 TRUTH = {
     name: value

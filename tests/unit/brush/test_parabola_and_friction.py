@@ -18,7 +18,7 @@ from tirelib.brush.parabola import (
     lateral_force,
     sliding_angle,
 )
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 LOAD, A, STIFFNESS = 4000.0, 0.06, 6e4
 CPY = STIFFNESS / (2 * A**2)

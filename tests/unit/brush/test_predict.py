@@ -10,7 +10,7 @@ from tirelib.brush.parabola import aligning_moment, lateral_force
 from tirelib.brush.parameters import BrushParameters, Carcass
 from tirelib.brush.predict import PointConditions, PointForces, PointParameters, predict_forces
 from tirelib.contact.profiles import parabola
-from tirelib.errors import ConvergenceError, ParameterError, ShapeError
+from tirelib.core.errors import ConvergenceError, ParameterError, ShapeError
 
 MU, LOAD, A = 0.9, 4000.0, 0.06
 CPY = 6e4 / (2 * A**2)

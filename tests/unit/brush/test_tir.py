@@ -17,7 +17,7 @@ from tirelib.brush.tir import (
     write_tir,
 )
 from tirelib.brush.tir_units import BASES, factor, words
-from tirelib.errors import FormatError, ParameterError
+from tirelib.core.errors import FormatError, ParameterError
 
 UNITS = "LENGTH='meter'\nFORCE='newton'\nANGLE='radians'\nMASS='kg'\nTIME='second'\n"
 TEXT = f"""! invented numbers, no real tire

@@ -17,7 +17,7 @@ from tests.unit.campaign.campaign_synthetic import (
     with_strain,
 )
 from tirelib.campaign import FloatArray, Run, check_campaign, read_campaign
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 Runs = tuple[Run, ...]
 

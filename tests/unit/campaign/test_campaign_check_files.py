@@ -11,7 +11,7 @@ from tests.unit.campaign.campaign_faults import channel, says, the_one
 from tests.unit.campaign.campaign_synthetic import Write, changed, rewrite
 from tirelib.campaign import FloatArray, Run, check_campaign, read_campaign
 from tirelib.campaign.mdf import Channel, Group, read_mdf, write_mdf
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 Runs = tuple[Run, ...]
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from tests.unit.campaign.campaign_synthetic import HEADER, Write, changed, with_rig
 from tirelib.campaign import CampaignHeader, Run, RunPlan, read, write_campaign
 from tirelib.cli.campaign import campaign
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 
 def call(*arguments: str | Path) -> Result:

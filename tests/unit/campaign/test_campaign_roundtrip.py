@@ -12,7 +12,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tests.unit.campaign.campaign_synthetic import HEADER, RATE, Write, changed
-from tirelib.axes import FLIPPED, sign
 from tirelib.campaign import (
     CampaignHeader,
     Run,
@@ -23,8 +22,9 @@ from tirelib.campaign import (
     write_campaign,
 )
 from tirelib.campaign.mdf import read_mdf
-from tirelib.errors import FormatError, ParameterError, ShapeError
-from tirelib.units import from_si
+from tirelib.core.axes import FLIPPED, sign
+from tirelib.core.errors import FormatError, ParameterError, ShapeError
+from tirelib.core.units import from_si
 
 axis_systems = st.sampled_from(sorted(FLIPPED))
 strain_units = st.sampled_from(["1", "%", "mm/m", "ustrain", "um/m"])

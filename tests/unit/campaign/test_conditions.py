@@ -11,7 +11,7 @@ from tirebench.emulator.faults import Faults
 from tirebench.wire.device import Device
 from tirelib.campaign import conditions_of
 from tirelib.campaign.conditions import changes_of
-from tirelib.held import HELD
+from tirelib.core.held import HELD
 
 RUN = synthetic_run(1, camber=0.02)
 

@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 
 from tests.synthetic import header
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.parameters import TireFile, read_tire
 from tirelib.identify.random_effects import angle_slope
 from tirelib.model.base import Operating, smoothed, values_of
 from tirelib.model.solution import Solution, solved
-from tirelib.parameters import TireFile, read_tire
 from tirelib.signal import LowPass
 from tirelib.waveforms import CONDITIONS, GRID, Waveforms
 

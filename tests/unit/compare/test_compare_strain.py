@@ -12,8 +12,8 @@ from tirelib.compare.model import model_of
 from tirelib.compare.regions import find_regions
 from tirelib.compare.sectors import SECTORS, sectors_of
 from tirelib.compare.strain import Comparison, compare_strain
-from tirelib.errors import CalibrationError, FormatError
-from tirelib.parameters import Number, TireFile
+from tirelib.core.errors import CalibrationError, FormatError
+from tirelib.core.parameters import Number, TireFile
 from tirelib.waveforms import GRID, Waveforms
 
 MODEL = model_of(model_file())

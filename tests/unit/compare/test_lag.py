@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.unit.compare.compare_synthetic import model_file, waveforms
-from tirelib.arrays import FloatArray
 from tirelib.compare.lag import fitted_delay
 from tirelib.compare.model import model_of
 from tirelib.compare.strain import Comparison, compare_strain
+from tirelib.core.arrays import FloatArray
 from tirelib.identify.delay import STD, earlier
 from tirelib.identify.random_effects import Whitening
 from tirelib.waveforms import GRID

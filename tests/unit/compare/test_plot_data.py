@@ -17,13 +17,13 @@ from tirelib.compare.forces import compare_forces
 from tirelib.compare.model import model_of
 from tirelib.compare.plot_data import measured_data, plot_data, write_plot_data
 from tirelib.compare.strain import compare_strain
+from tirelib.core.errors import CalibrationError, ParameterError
+from tirelib.core.parameters import Number
 from tirelib.effects import CATALOGUE
-from tirelib.errors import CalibrationError, ParameterError
 from tirelib.identify.delay import by_delay
 from tirelib.model.base import coordinates, operating_points
 from tirelib.model.slopes import by_values
 from tirelib.model.solution import solved
-from tirelib.parameters import Number
 from tirelib.waveforms import measure_waveforms
 
 

@@ -15,7 +15,7 @@ from tirelib.contact.profiles import (
     power_law,
     sampled,
 )
-from tirelib.errors import ParameterError, ShapeError
+from tirelib.core.errors import ParameterError, ShapeError
 
 A1, A2 = -0.06, 0.05
 H = 0.055

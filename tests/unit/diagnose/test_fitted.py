@@ -10,14 +10,14 @@ from scipy import optimize
 
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, runs
 from tests.unit.identify.model_waves import TIRE
-from tirelib.arrays import FloatArray
 from tirelib.compare.error import Yardstick, error_of
 from tirelib.compare.model import model_of
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.diagnose.diagnose import plain_tires
 from tirelib.diagnose.fitted import Fitted, fitted, least_error
 from tirelib.effects import CATALOGUE
 from tirelib.effects.effect import Effect, effect
-from tirelib.errors import ParameterError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.delay import UNIT, by_delay, earlier, late
 from tirelib.infer.posterior import Posterior, posterior

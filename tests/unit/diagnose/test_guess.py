@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.unit.diagnose.planted import runs
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.diagnose.guess import guess_law
 from tirelib.model.state import Operating
 from tirelib.waveforms import GRID

@@ -9,9 +9,9 @@ import pytest
 
 from tests.unit.diagnose.planted import EFFECT, LOADS, model_file, runs
 from tests.unit.identify.model_waves import TIRE
-from tirelib.arrays import BoolArray
 from tirelib.compare.error import Yardstick, error_of
 from tirelib.compare.model import Model, model_of
+from tirelib.core.arrays import BoolArray
 from tirelib.diagnose.diagnose import plain_tires
 from tirelib.diagnose.document import next_test
 from tirelib.diagnose.fitted import Fitted, fitted

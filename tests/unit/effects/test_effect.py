@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tirelib.core.errors import ConvergenceError, ParameterError
+from tirelib.core.parameters import read_tire
 from tirelib.effects import CATALOGUE, Effect, effect
-from tirelib.errors import ConvergenceError, ParameterError
 from tirelib.model.base import predict, values_of
 from tirelib.model.state import State
 from tirelib.model.strain_bench import reference_plan
-from tirelib.parameters import read_tire
 
 TIRE = read_tire("table-6-1").tire
 POINTS = reference_plan(TIRE).points.take(np.array([0, 30, 65]))

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from tirelib.core.errors import FormatError
 from tirelib.effects import CATALOGUE
 from tirelib.effects import load as module
 from tirelib.effects.load import all_effects, read_effects
-from tirelib.errors import FormatError
 
 GOOD = """
 from tirelib.effects import effect

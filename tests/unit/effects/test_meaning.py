@@ -8,11 +8,11 @@ import pytest
 from scipy.stats import norm
 
 from tests.physics.test_effects import BASE, FREE_ROLLING, PLAN, TIRE, VALUES, run, tangents, wave
-from tirelib.arrays import FloatArray
 from tirelib.contact.fourier import evaluate
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
 from tirelib.effects.patch import held_shear
-from tirelib.errors import ParameterError
 from tirelib.model.base import linearised, predict
 from tirelib.model.solution import solved
 from tirelib.model.state import State

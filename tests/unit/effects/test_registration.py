@@ -9,9 +9,9 @@ import pytest
 from click.testing import CliRunner
 
 from tirelib.cli.effects import effects
+from tirelib.core.errors import FormatError
 from tirelib.effects import CATALOGUE, Effect, effect
 from tirelib.effects.load import read_effects
-from tirelib.errors import FormatError
 from tirelib.model.registration import Registration, register, registered_effects
 from tirelib.model.state import State
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import tomli_w
 
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.estimators.train import Trained

@@ -8,7 +8,8 @@ import pytest
 
 from tests.synthetic import LATERAL, cornering_runs, header, synthetic_run, write
 from tirelib.campaign import Campaign, read_campaign
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
+from tirelib.core.flags import TurnFlag
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.contact_length import contact_lengths
@@ -16,7 +17,6 @@ from tirelib.estimators.dissertation import fit_all
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained, take, train
 from tirelib.features import Features
-from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, measure_run, observe, same_tire
 
 

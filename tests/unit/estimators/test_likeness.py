@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from tests.synthetic import LATERAL, header, synthetic_run
-from tirelib.arrays import FloatArray
 from tirelib.campaign import Campaign
 from tirelib.cli.limits import weakly_checked
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError
+from tirelib.core.flags import TurnFlag
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.doubt import ANGLE_STEP, with_moved
@@ -22,7 +23,6 @@ from tirelib.estimators.regressors import ODD, compute_regressors
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained, take
 from tirelib.features import Features
-from tirelib.flags import TurnFlag
 from tirelib.observations import Observations, measure_run, observe, same_tire
 
 Regressors = Mapping[str, FloatArray]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirelib.campaign import Campaign
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.reference_turn import STRAIN_UNIT, ReferenceTurn, folded

@@ -5,12 +5,12 @@ import pytest
 
 import tirelib
 from tirelib.campaign import Campaign
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import NUMBERS
+from tirelib.core.units import TABLE, to_si
 from tirelib.estimators.train import Trained
 from tirelib.observations import Observations
-from tirelib.parameters import NUMBERS
 from tirelib.tables import SI_UNITS
-from tirelib.units import TABLE, to_si
 
 
 def test_a_row_of_estimates_is_a_turn_beside_what_was_measured(

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.flags import TurnFlag
 from tirelib.estimators.any_road import Seen, tell
 from tirelib.estimators.calibration import LARGEST_ANGLE_STD
 from tirelib.estimators.fit_sliding import Runs, fit_sliding
@@ -23,7 +24,6 @@ from tirelib.estimators.unknowns import (
     Road,
     spread,
 )
-from tirelib.flags import TurnFlag
 from tirelib.observations import Observations
 
 CURVE = SlidingCurve(

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from tests.synthetic import header, synthetic_run
+from tirelib.core.flags import TurnFlag
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Range
 from tirelib.estimators.train import Trained
 from tirelib.features import Features
-from tirelib.flags import TurnFlag
 from tirelib.observations import measure_run
 
 

@@ -10,16 +10,16 @@ from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, runs
 from tests.unit.force_campaigns import brush_file, write_sweep
 from tirelib.campaign import Campaign, read_campaign
 from tirelib.compare.model import model_of
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import TireFile
 from tirelib.diagnose.diagnose import Diagnosis, diagnose
 from tirelib.diagnose.forces.assess import ForceAssessment
 from tirelib.effects import CATALOGUE
-from tirelib.errors import ParameterError
 from tirelib.extend.additions import additions
 from tirelib.extend.extension import extended
 from tirelib.infer import select
 from tirelib.journey import add
 from tirelib.journey import diagnose as diagnose_model
-from tirelib.parameters import TireFile
 
 PLANTED = {"friction_pressure": 0.3, "stiffness_temperature": 0.5, "brush_camber": 0.08}
 FEW = {name: CATALOGUE[name] for name in (*PLANTED, "friction_load", "stiffness_pressure")}

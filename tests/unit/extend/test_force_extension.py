@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from tests.unit.force_campaigns import brush_file, steady_runs, write_forces
+from tirelib.core.errors import FormatError, ParameterError
+from tirelib.core.parameters import TireFile, read_tire, write_tire
 from tirelib.diagnose.forces.assess import ForceCase, force_case, force_cases
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.errors import FormatError, ParameterError
 from tirelib.extend.force_document import force_extended_file, force_extension_document
 from tirelib.extend.force_extension import (
     ForceExtension,
@@ -21,7 +22,6 @@ from tirelib.extend.force_extension import (
 )
 from tirelib.extend.model_file import undone_file
 from tirelib.journey import add
-from tirelib.parameters import TireFile, read_tire, write_tire
 from tirelib.report.figures.waterfall import waterfall_of
 
 EFFECT, SLOPE = CATALOGUE["friction_load"], 0.25

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.synthetic import LATERAL, RATE, record
+from tirelib.core.flags import TurnFlag
 from tirelib.features import Features, concatenate_features, extract_features
 from tirelib.features.peaks import peak
 from tirelib.features.table import feature_frame, rate_slope, units
-from tirelib.flags import TurnFlag
 from tirelib.signal import cut_turns
 
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from tests.synthetic import LATERAL, header
-from tirelib.arrays import FloatArray
 from tirelib.campaign import Tolerance
+from tirelib.core.arrays import FloatArray
+from tirelib.core.parameters import Tire
 from tirelib.identify.random_effects import angle_slope
 from tirelib.model.base import values_of
 from tirelib.model.solution import solved
 from tirelib.model.state import Operating
-from tirelib.parameters import Tire
 from tirelib.signal import LowPass
 from tirelib.waveforms import CONDITIONS, Waveforms
 

@@ -17,13 +17,13 @@ from tirelib.campaign import (
     write_campaign,
 )
 from tirelib.campaign.importing import import_campaign
-from tirelib.errors import CalibrationError, ParameterError
+from tirelib.core.errors import CalibrationError, ParameterError
+from tirelib.core.parameters import read_tire
 from tirelib.identify.brush_fit import BrushFit, fit_brush
 from tirelib.identify.brush_study import stiffness_at
 from tirelib.identify.error_bands import band_errors, bands, levels
 from tirelib.identify.force_data import ForceData, force_data
 from tirelib.identify.ring_patch import half_lengths, ring_contact
-from tirelib.parameters import read_tire
 
 C, MU, A0, N = 8e6, 0.95, 0.062, 0.45
 LOADS = (1500.0, 3000.0, 4500.0, 6000.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.unit.identify.model_waves import LOADS, made_waves
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
 from tirelib.identify.campaign_data import STRUCTURE, straight_runs, working_gages
 from tirelib.waveforms import Waveforms
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.unit.identify.test_brush_fit import WIDE, make
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
 from tirelib.identify.brush_advice import LARGEST_ANGLE, candidates
 from tirelib.identify.brush_fit import fit_brush
 from tirelib.identify.brush_study import study_of

@@ -11,12 +11,12 @@ from tirelib.brush.forces import brush_forces
 from tirelib.brush.parameters import BrushParameters
 from tirelib.campaign import read_campaign
 from tirelib.contact.profiles import PressureProfile
-from tirelib.errors import CalibrationError, ParameterError
+from tirelib.core.errors import CalibrationError, ParameterError
+from tirelib.core.parameters import Tire, read_tire
 from tirelib.identify.force_data import ForceData, force_data
 from tirelib.identify.forces import _compared
 from tirelib.identify.lateral_force import KINDS, PressureBand, compare_pressures
 from tirelib.identify.ring_patch import profiles, ring_contact
-from tirelib.parameters import Tire, read_tire
 from tirelib.rig.campaign import run_plan
 from tirelib.rig.plans import Plan
 from tirelib.rig.tire import Condition, RigTire

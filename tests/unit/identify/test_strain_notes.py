@@ -9,7 +9,7 @@ import pytest
 from tests.synthetic import synthetic_run, write
 from tests.unit.identify.model_waves import made_waves
 from tirelib.campaign import Campaign, RunPlan, read_campaign
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.estimate import Estimate
 from tirelib.identify.identify import _contradictions, _with_run, start_file

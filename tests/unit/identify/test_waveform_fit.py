@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.unit.identify.model_waves import LOADS, TIRE, exact_waveform, made_waves, operating
-from tirelib.arrays import FloatArray
-from tirelib.errors import ConvergenceError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ConvergenceError
 from tirelib.identify.campaign_data import Data, straight_runs
 from tirelib.identify.delay import STD, UNIT, earlier
 from tirelib.identify.discrepancy import Discrepancy

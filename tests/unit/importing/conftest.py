@@ -8,7 +8,7 @@ import pytest
 
 from tests.unit.importing.importing_synthetic import sae_map, write_map
 from tirelib.campaign.importing import ImportReport, import_campaign
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 Importer = Callable[..., ImportReport]
 Refused = Callable[..., tuple[str, ...]]

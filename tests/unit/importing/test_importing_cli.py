@@ -16,7 +16,7 @@ from tests.unit.importing.importing_synthetic import (
 )
 from tirelib.cli import program
 from tirelib.cli.campaign import campaign
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 
 def call(*arguments: str | Path) -> Result:

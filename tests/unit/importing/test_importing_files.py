@@ -17,7 +17,7 @@ from tirelib.campaign.importing import CsvOptions, read_table
 from tirelib.campaign.importing.columns import did_you_mean
 from tirelib.campaign.importing.suggest import list_columns, suggest_map
 from tirelib.campaign.mdf import Channel, Group, write_mdf
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 
 def refusal(path: Path, options: CsvOptions | None = None) -> str:

@@ -20,12 +20,12 @@ from tests.unit.importing.importing_synthetic import (
     write_mat73,
     write_parquet,
 )
-from tirelib.axes import sign
 from tirelib.campaign import Run, check_campaign, read_campaign, write_campaign
 from tirelib.campaign.importing import TydexChannel, TydexFile, write_tydex
 from tirelib.campaign.mdf import Channel, Group, write_mdf
 from tirelib.campaign.write import FIELD_UNITS
-from tirelib.units import dimension_of, from_si
+from tirelib.core.axes import sign
+from tirelib.core.units import dimension_of, from_si
 
 EXACT = 1e-12  # one conversion to field units and back on each side, a few ulp
 DEG = np.pi / 180.0

@@ -15,7 +15,7 @@ from tirelib.campaign.importing import (
     read_tydex,
     write_tydex,
 )
-from tirelib.errors import FormatError, ParameterError, ShapeError
+from tirelib.core.errors import FormatError, ParameterError, ShapeError
 
 # Written by hand, column by column: name 10, comment 30, unit 10, then 10 characters a value.
 BY_HAND = """\

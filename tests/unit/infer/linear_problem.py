@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.effects import Effect, effect
 from tirelib.infer.plain import Family
 from tirelib.infer.problem import Point

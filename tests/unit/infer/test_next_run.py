@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.unit.infer.linear_problem import N, Solved, Toy, by_effect, drawn, family
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.infer.next_run import next_runs
 from tirelib.infer.select import Hypotheses
 

@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from tests.unit.infer.linear_problem import SHAPES, N, Toy, drawn, family
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.infer import null
 from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.null import standard

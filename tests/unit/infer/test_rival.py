@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.unit.infer.linear_problem import EFFECTS, N, Toy, by_effect, drawn, family
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.infer.hypothesis import LAWS, Hypothesis
 from tirelib.infer.posterior import Posterior
 from tirelib.infer.problem import Point

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests.unit.infer.linear_problem import SHAPES, N, Solved, Toy, drawn, family
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.infer.hypothesis import Hypothesis, judged
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.problem import Point

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.unit.identify.model_waves import TIRE, operating
+from tirelib.core.errors import ConvergenceError
+from tirelib.core.parameters import FIELDS
 from tirelib.effects import CATALOGUE
-from tirelib.errors import ConvergenceError
 from tirelib.model import chain
 from tirelib.model.base import (
     FREE,
@@ -21,7 +22,6 @@ from tirelib.model.base import (
     values_of,
 )
 from tirelib.model.state import State
-from tirelib.parameters import FIELDS
 from tirelib.signal import LowPass
 from tirelib.waveforms import GRID
 

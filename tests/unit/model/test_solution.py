@@ -8,9 +8,9 @@ import pytest
 from routes.correction import large_displacements, predict_with
 
 from tests.unit.identify.model_waves import TIRE, operating
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
-from tirelib.errors import ParameterError
 from tirelib.model.base import BARE, coordinates, move, predict, values_of
 from tirelib.model.chain import Changes
 from tirelib.model.slopes import SolutionSlopes, added_by_values, by_effects, by_values, slopes_of

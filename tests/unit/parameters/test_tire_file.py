@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from tirelib.contact.radial import load
 from tirelib.contact.tread import Tread
-from tirelib.errors import FormatError, ParameterError
-from tirelib.parameters import FIELDS, Number, Tire, TireFile, find_tire, read_tire, write_tire
-from tirelib.parameters.tire_file import KINDS, models_folder
+from tirelib.core.errors import FormatError, ParameterError
+from tirelib.core.parameters import FIELDS, Number, Tire, TireFile, find_tire, read_tire, write_tire
+from tirelib.core.parameters.tire_file import KINDS, models_folder
 from tirelib.ring.compliance import compliance
 from tirelib.ring.ring import Ring
 

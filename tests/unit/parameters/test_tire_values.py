@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.errors import ParameterError
-from tirelib.parameters import FIELDS, Tire, read_tire
-from tirelib.parameters.tire_file import KINDS
-from tirelib.units import units_of
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import FIELDS, Tire, read_tire
+from tirelib.core.parameters.tire_file import KINDS
+from tirelib.core.units import units_of
 
 TIRE = read_tire("table-6-1").tire
 

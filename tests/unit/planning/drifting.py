@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 
 from tests.unit.force_points import MODEL
-from tirelib.arrays import FloatArray
 from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
+from tirelib.core.arrays import FloatArray
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.fit import MeasuredForce
 from tirelib.identify.force_data import ForceData

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from tests.unit.planning.drifting import NOISE, PRESSURES, case, side_force
+from tirelib.core.errors import ParameterError
 from tirelib.diagnose.forces.assess import ForceAssessment, ForceCase, assess_forces
 from tirelib.diagnose.forces.document import force_diagnosis_document
 from tirelib.diagnose.forces.models import plain_tires
 from tirelib.effects import CATALOGUE
-from tirelib.errors import ParameterError
 from tirelib.infer.problem import Point
 from tirelib.infer.select import Hypotheses
 from tirelib.planning.criterion import NOTHING, NextTest

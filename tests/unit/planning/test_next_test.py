@@ -16,7 +16,7 @@ from tests.unit.planning.made import (
     runs,
     suspects,
 )
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.infer.next_run import DRAWS
 from tirelib.planning.criterion import NOTHING
 from tirelib.planning.document import Plan, advice, plan_document

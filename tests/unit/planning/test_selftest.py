@@ -4,8 +4,8 @@ import pytest
 
 from tests.unit.diagnose.planted import runs
 from tests.unit.identify.model_waves import TIRE
+from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
-from tirelib.errors import ParameterError
 from tirelib.model.base import values_of
 from tirelib.planning.selftest import Planting, SelfTest, selftest
 from tirelib.planning.selftest_document import selftest_document

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.unit.planning.made import CONDITIONS, points_at
+from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
-from tirelib.errors import ParameterError
 from tirelib.planning.document import Plan, plan_document
 from tirelib.planning.envelope import Envelope, operating_at
 from tirelib.planning.suspects import given_suspects, suspects_of

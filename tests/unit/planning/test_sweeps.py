@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from tests.unit.planning.drifting import PRESSURES, case
+from tirelib.core.errors import ParameterError
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.effects import CATALOGUE
-from tirelib.errors import ParameterError
 from tirelib.identify.force_points import ForcePoints, force_points
 from tirelib.planning.document import Plan, plan_document, plan_force_test
 from tirelib.planning.envelope import Envelope

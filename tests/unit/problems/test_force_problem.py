@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from tests.unit.force_points import force_problem
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE, effect
 from tirelib.infer.plain import Family
 from tirelib.infer.posterior import posterior
 from tirelib.infer.problem import Point
 from tirelib.infer.select import select
-from tirelib.threads import one_thread
 
 NAMES = ("ring_pressure", "carcass", "friction_load", "brush_camber", "stiffness_drift")
 STRENGTHS = ([0.3], [0.004], [0.1], [0.1], [0.1, 0.05])

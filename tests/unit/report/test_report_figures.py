@@ -19,7 +19,7 @@ from pages.figures.strain import figure_3_7, figure_4_1
 from pages.turns import TypicalTurns, typical_turns
 
 from tests.unit.report.conftest import World
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.cornering import CorneringTrend
 from tirelib.report import figures
 from tirelib.report.accuracy import QUANTITIES

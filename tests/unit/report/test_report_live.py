@@ -20,7 +20,7 @@ from pages.live import (
 )
 
 from tests.unit.report.conftest import World
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.result import estimate_document
 from tirelib.signal import LowPass
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.errors import FormatError, ParameterError
-from tirelib.parameters import Tire, read_tire
+from tirelib.core.errors import FormatError, ParameterError
+from tirelib.core.parameters import Tire, read_tire
 from tirelib.report.simulation import LARGEST_BELT_SPEED, Simulation, simulate
 from tirelib.report.simulation_document import columns, point_document, write_curves
 from tirelib.report.simulation_peaks import extreme

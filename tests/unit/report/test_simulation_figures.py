@@ -15,7 +15,7 @@ from ring_figures import cases, contact, lateral, speed, static
 from ring_figures import loads as over_load
 
 from tests.unit.report.test_report_figures import UNIT, label_of, with_data
-from tirelib.parameters import read_tire
+from tirelib.core.parameters import read_tire
 from tirelib.report.figures import ring_panels, ring_simulation
 from tirelib.report.simulation import Simulation, simulate
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tirelib.parameters import read_tire
+from tirelib.core.parameters import read_tire
 from tirelib.report import simulation, simulation_series
 from tirelib.report.simulation import simulate
 from tirelib.report.simulation_peaks import Peaks

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from tirelib.campaign import read_campaign
 from tirelib.cli.rig import rig
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.rig.campaign import run_plan
 from tirelib.rig.plans import Plan, on_one_road
 from tirelib.rig.tire import Condition, RigTire

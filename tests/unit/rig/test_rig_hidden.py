@@ -15,11 +15,11 @@ from tests.unit.rig.hidden_cases import (
     planted,
     seen,
 )
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import Tire
 from tirelib.effects import CATALOGUE
-from tirelib.errors import ParameterError
 from tirelib.model.base import predict, values_of
 from tirelib.model.state import Operating
-from tirelib.parameters import Tire
 from tirelib.rig.hidden import HIDDEN, hidden
 from tirelib.rig.mesh import mesh
 from tirelib.rig.observe import Trace, contact, edges, forces

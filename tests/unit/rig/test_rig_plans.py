@@ -1,6 +1,6 @@
 import pytest
 
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.rig.plans import PLANS, kind, plan, with_repeats
 from tirelib.rig.tire import Condition
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tirelib.campaign import check_campaign, read_campaign
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.rig.campaign import run_plan
 from tirelib.rig.measure import MeasuringChain, Recording, Stage, record
 from tirelib.rig.mesh import mesh

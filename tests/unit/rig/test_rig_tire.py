@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.rig.observe import edges, forces
 from tirelib.rig.solve import solve
 from tirelib.rig.tire import NEW_DEPTH, TIRES, Condition, RigTire, on_road, tire

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.synthetic import LATERAL, RATE, waveform
+from tirelib.core.flags import TurnFlag, flag_names
 from tirelib.features.extract import Features, extract_features
-from tirelib.flags import TurnFlag, flag_names
 from tirelib.signal import TurnCutter, cut_turns
 from tirelib.signal.angle import AngleLaw, angle_law
 from tirelib.signal.course import Course, course

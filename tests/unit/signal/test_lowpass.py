@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.signal.lowpass import LowPass, half_width, smooth_to_angle
 
 STEP = 2 * np.pi / 1000

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.synthetic import LATERAL, RATE, frames, record
-from tirelib.errors import ParameterError, ShapeError
-from tirelib.flags import INVALIDATING, TurnFlag
+from tirelib.core.errors import ParameterError, ShapeError
+from tirelib.core.flags import INVALIDATING, TurnFlag
 from tirelib.fmu.virtual.spec import default_surface
 from tirelib.fmu.virtual.surface import shared_surface
 from tirelib.signal import LowPass, Turn, TurnCutter, Turns, cut_turns, stack_turns

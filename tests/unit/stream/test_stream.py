@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from tests.fmu import live
 from tests.synthetic import LATERAL, frames
 from tirelib.campaign import conditions_of, read_campaign
-from tirelib.errors import CalibrationError, ParameterError, ShapeError
+from tirelib.core.errors import CalibrationError, ParameterError, ShapeError
+from tirelib.core.flags import TurnFlag, flag_names
 from tirelib.estimators.calibration import Estimates
 from tirelib.features import Features, extract_features
-from tirelib.flags import TurnFlag, flag_names
 from tirelib.observations import measure_run
 from tirelib.signal import LowPass, cut_turns
 from tirelib.stream import StreamEstimator, TurnEstimate

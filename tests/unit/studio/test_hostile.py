@@ -11,7 +11,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from tests.unit.studio.conftest import TOKEN, Served
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.studio import intake
 from tirelib.studio.server import STATIC
 from tirelib.web.assets import CHARTS

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tirelib.cli import main
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 from tirelib.studio.disk import hold
 from tirelib.studio.parts import PARTS
 

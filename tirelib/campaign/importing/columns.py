@@ -7,7 +7,7 @@ from difflib import get_close_matches
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 FloatArray = npt.NDArray[np.float64]
 

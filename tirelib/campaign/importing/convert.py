@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.axes import sign
 from tirelib.campaign.finding import RunFinding
 from tirelib.campaign.importing.columns import Column, Table, did_you_mean, row_list
 from tirelib.campaign.importing.defects import Clock
@@ -21,8 +20,9 @@ from tirelib.campaign.model import BoolArray, FloatArray
 from tirelib.campaign.plan import SET_POINTS
 from tirelib.campaign.problem import Problem
 from tirelib.campaign.timebase import gage_time_problems
-from tirelib.errors import UnitError
-from tirelib.units import dimensions_of_unit, from_si, to_si
+from tirelib.core.axes import sign
+from tirelib.core.errors import UnitError
+from tirelib.core.units import dimensions_of_unit, from_si, to_si
 
 _SAME = 1e-9  # a set point's column varies by less within a run, relative
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from tirelib.campaign.importing.columns import Column, FloatArray, Table, refusal
-from tirelib.units import dimensions_of_unit
+from tirelib.core.units import dimensions_of_unit
 
 SEPARATORS = {";": "';'", "\t": "tab", ",": "','", "|": "'|'", " ": "blanks"}
 """Separators that are looked for, with their names in messages. A blank stands for any number."""

@@ -16,7 +16,7 @@ from tirelib.campaign.importing.matlab import (
 )
 from tirelib.campaign.importing.tydex import read_tydex
 from tirelib.campaign.mdf import Group, read_mdf
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 SUFFIXES = {
     ".mat": "MATLAB",

@@ -31,7 +31,7 @@ from tirelib.campaign.model import CampaignHeader, Run, RunPlan
 from tirelib.campaign.problem import Problem, errors_of
 from tirelib.campaign.timebase import gage_time_problems
 from tirelib.campaign.write import write_campaign
-from tirelib.errors import FormatError, ParameterError
+from tirelib.core.errors import FormatError, ParameterError
 
 Progress = Callable[[str], None]
 

@@ -20,8 +20,8 @@ from tirelib.campaign.importing.mapreader import (
 from tirelib.campaign.model import KINDS, CampaignHeader, TireGeometry
 from tirelib.campaign.plan import SET_POINTS
 from tirelib.campaign.problem import Problem, errors_of, raise_errors
-from tirelib.errors import UnitError
-from tirelib.units import QUANTITIES, dimension_of, to_si
+from tirelib.core.errors import UnitError
+from tirelib.core.units import QUANTITIES, dimension_of, to_si
 
 POINTS = tuple(column.name for column in SET_POINTS)
 """Names of the set points, as in ``runs.csv``."""

@@ -9,7 +9,7 @@ from typing import Any
 from tirelib.campaign.importing.columns import did_you_mean
 from tirelib.campaign.importing.delimited import CsvOptions
 from tirelib.campaign.problem import Problem
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 FORMAT = "tirelib-map/1"
 

@@ -7,13 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from tirelib.axes import sign
 from tirelib.campaign.importing.convert import Piece
 from tirelib.campaign.importing.mapfile import ImportMap
 from tirelib.campaign.model import RunPlan
 from tirelib.campaign.plan import SET_POINTS
 from tirelib.campaign.problem import Problem
-from tirelib.units import from_si, to_si
+from tirelib.core.axes import sign
+from tirelib.core.units import from_si, to_si
 
 _SHOWN = 5
 

@@ -18,7 +18,7 @@ from tirelib.campaign.importing.delimited import CsvOptions
 from tirelib.campaign.importing.formats import read_table
 from tirelib.campaign.importing.mapheader import is_gage, strain_number
 from tirelib.campaign.importing.mapreader import FORMAT
-from tirelib.units import QUANTITIES, dimension_of, dimensions_of_unit, to_si
+from tirelib.core.units import QUANTITIES, dimension_of, dimensions_of_unit, to_si
 
 KNOWN_NAMES: Mapping[str, str] = {
     "ET": "time",

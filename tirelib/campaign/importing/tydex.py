@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.errors import FormatError, ParameterError, ShapeError
+from tirelib.core.errors import FormatError, ParameterError, ShapeError
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -14,18 +14,18 @@ from tirelib.compare.force_model import (
     usable_points,
 )
 from tirelib.compare.forces import UNITS
+from tirelib.core.errors import CalibrationError
+from tirelib.core.parameters import TireFile
 from tirelib.diagnose.diagnose import FALSE_ALARM, Finding
 from tirelib.diagnose.forces.diagnose import ForceDiagnosis, diagnose_force
 from tirelib.diagnose.forces.fit import ForceFit, MeasuredForce
 from tirelib.diagnose.forces.left import ForceLeft, left_of
 from tirelib.diagnose.told import Assessed
 from tirelib.effects import Effect
-from tirelib.errors import CalibrationError
 from tirelib.identify.force_bench import Changes
 from tirelib.identify.force_data import force_data
 from tirelib.identify.force_noise import force_noise
 from tirelib.identify.force_points import ForcePoints, force_points
-from tirelib.parameters import TireFile
 from tirelib.problems.force_plan import varies
 from tirelib.problems.forces import ForceProblem
 

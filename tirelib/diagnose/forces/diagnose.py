@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.threads import one_thread
 from tirelib.diagnose.diagnose import FALSE_ALARM, Finding, findings_of
 from tirelib.diagnose.forces.fit import ForceFit, MeasuredForce
 from tirelib.diagnose.forces.models import ForceModels, plain_tires
@@ -13,7 +14,6 @@ from tirelib.diagnose.held_out import pooled
 from tirelib.effects import Effect
 from tirelib.infer.select import Verdict, select
 from tirelib.problems.forces import ForceProblem
-from tirelib.threads import one_thread
 
 Steps = tuple[tuple[str, ForceFit], ...]
 """Effects one after the other, each with the fit that has it and those before."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import ConvergenceError, TirelibError
 from tirelib.effects import Effect
-from tirelib.errors import ConvergenceError, TirelibError
 from tirelib.identify.brush_law import SPECS
 from tirelib.identify.force_bench import Changes, ForceBench
 from tirelib.problems.forces import WIDTH, changes_at, fitted_constants, moved_constants

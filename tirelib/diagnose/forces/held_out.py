@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.errors import TirelibError
 from tirelib.diagnose.forces.fit import ForceFit, MeasuredForce, fit_force
 from tirelib.diagnose.held_out import Fold
-from tirelib.errors import TirelibError
 from tirelib.identify.force_points import set_points
 from tirelib.problems.force_plan import varies
 

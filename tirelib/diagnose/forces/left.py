@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.diagnose.forces.fit import ForceFit, MeasuredForce
 from tirelib.diagnose.left import FLAT, Power, powers_of
 from tirelib.model.brush import BrushConditions

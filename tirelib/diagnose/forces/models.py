@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from tirelib.core.errors import TirelibError
+from tirelib.core.forked import forked
 from tirelib.diagnose.forces.fit import ForceFit, MeasuredForce, fit_force, with_effect
 from tirelib.diagnose.forces.floor import force_floor
 from tirelib.diagnose.forces.held_out import errors_of, force_folds
 from tirelib.effects import Effect
-from tirelib.errors import TirelibError
-from tirelib.forked import forked
 from tirelib.infer.plain import Family, covering, load
 from tirelib.infer.select import Hypotheses
 from tirelib.problems.forces import ForceProblem

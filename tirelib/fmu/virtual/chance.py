@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import ndtri
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 BLOCK = 256
 """Samples that are drawn at a time."""

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.fmu.virtual.surface import DEGREE, Surface
 
 FORMAT = 2.0

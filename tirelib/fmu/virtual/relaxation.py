@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 SETTLED = 1e-10
 """Rest of a relaxation that is dropped [rad], [1]."""

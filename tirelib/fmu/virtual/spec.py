@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
+from tirelib.core.parameters.tire_file import models_folder
 from tirelib.fmu.export import export
 from tirelib.fmu.handbook import html_table, page
 from tirelib.fmu.native import pack
@@ -21,7 +22,6 @@ from tirelib.fmu.virtual.options import RATES, Options
 from tirelib.fmu.virtual.surface import Surface, read_surface
 from tirelib.fmu.virtual.table import START, inputs, outputs, parameters
 from tirelib.fmu.virtual.wheel import VirtualWheel
-from tirelib.parameters.tire_file import models_folder
 
 MODEL = "VirtualTire"
 DESCRIPTION = "Tire with strain gages: strain frames from load, slip, camber, speed and pressure"

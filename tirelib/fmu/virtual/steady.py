@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 BLOCK = 256
 """Samples that are found at a time."""

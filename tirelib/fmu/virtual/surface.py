@@ -17,8 +17,9 @@ from typing import Any, Final
 import numpy as np
 from scipy.interpolate import RBFInterpolator
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import FormatError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import FormatError
+from tirelib.core.threads import one_thread
 from tirelib.fmu.virtual.coordinates import (
     FRICTION,
     INPUTS,
@@ -29,7 +30,6 @@ from tirelib.fmu.virtual.coordinates import (
     coordinates,
 )
 from tirelib.fmu.virtual.waveform import Waveforms
-from tirelib.threads import one_thread
 
 FORMAT = "tirelib-virtual-tire/2"
 FORCES = ("Fx", "Fy", "Mz", "loaded_radius")

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import spline_filter1d
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.fmu.virtual.coordinates import half_angle, spline_weights, warped
 
 

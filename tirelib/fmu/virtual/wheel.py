@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ParameterError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ParameterError
 from tirelib.fmu.refusals import FAULT, StepError, status_entry
 from tirelib.fmu.virtual.chance import chance, noise
 from tirelib.fmu.virtual.coordinates import INPUTS

@@ -4,13 +4,13 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from tirelib.arrays import FloatArray, IntArray
 from tirelib.compare.force_curves import Curve, ranked, slip_of
 from tirelib.compare.forces import UNITS, ForceComparison
 from tirelib.compare.sentences import told
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.quantities import QUANTITIES
 from tirelib.identify.error_bands import levels
 from tirelib.identify.force_points import CELL_ANGLE
-from tirelib.quantities import QUANTITIES
 from tirelib.report.figures.compare_plot import (
     Plot,
     confidence,

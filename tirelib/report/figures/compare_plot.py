@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 from scipy.special import stdtrit
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.report.style import BLUE, FAINT, INK, RULE
 
 DIVERGING = [

@@ -4,7 +4,6 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from tirelib.arrays import BoolArray, FloatArray
 from tirelib.compare.document import edge_value
 from tirelib.compare.runs import Factor
 from tirelib.compare.sectors import SECTORS
@@ -12,7 +11,8 @@ from tirelib.compare.sentences import told
 from tirelib.compare.set_points import NAMES
 from tirelib.compare.strain import Comparison
 from tirelib.compare.tracks import Track
-from tirelib.quantities import QUANTITIES
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.quantities import QUANTITIES
 from tirelib.report.figures.compare_heat import NAMES as CONDITIONS
 from tirelib.report.figures.compare_plot import Plot, confidence, level_means, styled_figure
 from tirelib.report.style import BLACK, BLUE, CATEGORIES, FAINT, RED

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.optimize import minimize_scalar
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 from tirelib.estimators.cornering import CorneringTrend, magic_formula
 from tirelib.estimators.dissertation import Means
 from tirelib.report.levels import load_levels, upright

@@ -3,13 +3,13 @@
 import numpy as np
 import plotly.graph_objects as go
 
-from tirelib.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.units import from_si
 from tirelib.diagnose.forces.assess import ForceAssessment
 from tirelib.diagnose.forces.fit import ForceFit
 from tirelib.identify.error_bands import levels
 from tirelib.problems.force_plan import varies
 from tirelib.report.figures.compare_plot import DIVERGING, Plot, limit_of, styled_figure
-from tirelib.units import from_si
 
 CONDITIONS = (
     ("load", "N", "force"),

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tirelib.arrays import BoolArray, FloatArray
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.train import Trained
 from tirelib.report.figures.regression import (
     RESIDUAL,

@@ -2,7 +2,7 @@
 
 from matplotlib.figure import Figure
 
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.train import Trained
 from tirelib.report.figures.regression import (
     RESIDUAL,

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from tirelib.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.estimators.dissertation import Regression
 from tirelib.estimators.train import Trained
 from tirelib.report.accuracy import FACTOR, TRUTH

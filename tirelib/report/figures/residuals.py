@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.special import ndtri
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import CalibrationError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.train import Trained
 from tirelib.report.accuracy import SIGNED, TITLE, UNIT
 from tirelib.report.figures.regression import (

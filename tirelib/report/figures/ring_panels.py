@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
+from tirelib.core.units import from_si
 from tirelib.report.simulation import MICRO, Simulation
 from tirelib.report.style import INK, label, zero_line
-from tirelib.units import from_si
 
 ANGLE = label("wheel angle from below the axle, entry < 0 < exit", "deg")
 SHORT_ANGLE = label("wheel angle, entry < 0 < exit", "deg")

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tirelib.errors import CalibrationError
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.dissertation import Regression
 from tirelib.estimators.train import Trained

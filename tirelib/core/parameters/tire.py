@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from types import MappingProxyType
 from typing import NamedTuple
 
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 
 class Field(NamedTuple):

@@ -1,7 +1,7 @@
 """The numbers of a tire: values with unit, uncertainty, kind and source."""
 
-from tirelib.parameters.tire import FIELDS, NUMBERS, Tire
-from tirelib.parameters.tire_file import Number, TireFile, find_tire, read_tire, write_tire
+from tirelib.core.parameters.tire import FIELDS, NUMBERS, Tire
+from tirelib.core.parameters.tire_file import Number, TireFile, find_tire, read_tire, write_tire
 
 __all__ = [
     "FIELDS",

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ShapeError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ShapeError
 
 GAGES, ANGLES = 16, 361
 """Most gages of a wheel, and wheel angles of a turn: sizes with which the core is compiled."""
@@ -189,7 +189,7 @@ class Core:
 
 def shipped(name: str) -> Path | None:
     """Return a file of ``fmu_src``: beside the package in a checkout, inside it when installed."""
-    package = Path(__file__).parent
+    package = Path(__file__).parents[1]
     for folder in (package.parent / "fmu_src", package / "fmu_src"):
         if (folder / name).is_file():
             return folder / name

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.arrays import FloatArray
-from tirelib.errors import ShapeError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import ShapeError
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ files and buses.
 
 from typing import TypedDict
 
-from tirelib.arrays import FloatArray
+from tirelib.core.arrays import FloatArray
 
 
 class Held(TypedDict, total=False):

@@ -9,15 +9,15 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from tirelib.errors import FormatError, ParameterError, UnitError
-from tirelib.parameters.tire import (
+from tirelib.core.errors import FormatError, ParameterError, UnitError
+from tirelib.core.parameters.tire import (
     FIELDS,
     NUMBERS,
     Tire,
     range_fault,
     unknown_name,
 )
-from tirelib.units import from_si, to_si
+from tirelib.core.units import from_si, to_si
 
 FORMAT = "tirelib-tire/1"
 FORMATS = (FORMAT, "tirelib-model/1")
@@ -109,8 +109,8 @@ class TireFile:
 
 def models_folder() -> Path:
     """Return the folder of the models that come with the library."""
-    inside = Path(__file__).parents[1] / "models"
-    return inside if inside.is_dir() else Path(__file__).parents[2] / "models"
+    inside = Path(__file__).parents[2] / "models"
+    return inside if inside.is_dir() else Path(__file__).parents[3] / "models"
 
 
 def find_tire(name: str | Path) -> Path:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.errors import FormatError
+from tirelib.core.errors import FormatError
 
 
 @contextmanager

@@ -14,7 +14,7 @@ Every conversion is its own inverse.
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from tirelib.errors import ParameterError
+from tirelib.core.errors import ParameterError
 
 FLIPPED: Mapping[str, frozenset[str]] = MappingProxyType(
     {

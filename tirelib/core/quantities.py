@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from tirelib.units import from_si, to_si
+from tirelib.core.units import from_si, to_si
 
 
 class Quantity(NamedTuple):
@@ -17,7 +17,7 @@ class Quantity(NamedTuple):
     ----------
     title : str
     dimension : str
-        As in `tirelib.units`.
+        As in `tirelib.core.units`.
     unit : str
         Engineer's unit; 1 for a ratio.
     signed : bool

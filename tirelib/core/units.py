@@ -11,7 +11,7 @@ from typing import NamedTuple, overload
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.errors import Fault, UnitError
+from tirelib.core.errors import Fault, UnitError
 
 FloatArray = npt.NDArray[np.float64]
 
