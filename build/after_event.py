@@ -14,8 +14,8 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.threads import one_thread
-from tirelib.signal import angle
-from tirelib.signal.turns import LARGEST_ANGLE_STD
+from tirelib.measured.signal import angle
+from tirelib.measured.signal.turns import LARGEST_ANGLE_STD
 
 TURN, TURNS, BEGINS = 1000, 16, 6.0
 """Samples of an even turn; turns; where the earliest bump begins."""

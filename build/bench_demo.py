@@ -258,8 +258,8 @@ def draw(steps: Steps, out: Path, day: Path, files: "LiveFiles", seen: Seen) -> 
 
     from tirelib.campaign import read_campaign
     from tirelib.estimators.calibration_file import read_calibration
+    from tirelib.measured.signal import LowPass
     from tirelib.report.page import Picture, Section, draw_all, write_page
-    from tirelib.signal import LowPass
 
     campaign, calibration = read_campaign(day), read_calibration(out / "calibration.toml")
     line = read_line(files, campaign)

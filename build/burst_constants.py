@@ -17,9 +17,9 @@ from road_constants import times
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.threads import one_thread
-from tirelib.signal import contacts
-from tirelib.signal.contacts import Contact, ContactFinder
-from tirelib.signal.turns import LONGEST_TURN
+from tirelib.measured.signal import contacts
+from tirelib.measured.signal.contacts import Contact, ContactFinder
+from tirelib.measured.signal.turns import LONGEST_TURN
 
 CENTRE, TRIALS, NEAR = 2, 60, 20
 NUMBERS = (

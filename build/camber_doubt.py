@@ -28,7 +28,7 @@ from tirelib.estimators.calibration_file import read_calibration, write_calibrat
 from tirelib.estimators.likeness import CAMBER_DRIFT
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.train import train
-from tirelib.observations import Observations
+from tirelib.measured.observations import Observations
 from tirelib.rig.plans import Plan, plan
 from tirelib.rig.tire import TIRES, Condition
 

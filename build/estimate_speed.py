@@ -18,9 +18,9 @@ import numpy as np
 from tirelib.campaign import conditions_of, read_campaign
 from tirelib.core.threads import one_thread
 from tirelib.estimators.calibration_file import read_calibration
-from tirelib.features import RecordReader, concatenate_features
-from tirelib.features.extract import reference_features
-from tirelib.signal import LowPass, TurnCutter, stack_turns
+from tirelib.measured.features import RecordReader, concatenate_features
+from tirelib.measured.features.extract import reference_features
+from tirelib.measured.signal import LowPass, TurnCutter, stack_turns
 
 
 def timed(work: Callable[[], Any]) -> tuple[float, Any]:

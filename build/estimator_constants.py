@@ -27,7 +27,7 @@ from tirelib.estimators.calibrate import calibrate_chain
 from tirelib.estimators.edge import EDGE_UNIT
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.unknowns import TWO_SIGMA
-from tirelib.observations import Observations, observe
+from tirelib.measured.observations import Observations, observe
 from tirelib.rig.campaign import TRUTH_FILE
 
 CONSTANTS: tuple[tuple[ModuleType, str], ...] = (

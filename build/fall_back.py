@@ -24,7 +24,7 @@ from tirelib.estimators import basis
 from tirelib.estimators.calibrate import calibrate_chain
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.train import take
-from tirelib.observations import Observations, observe
+from tirelib.measured.observations import Observations, observe
 from tirelib.rig.plans import plan
 
 STEP = 250.0

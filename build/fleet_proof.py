@@ -42,7 +42,7 @@ from tirelib.fleet import engine, work
 from tirelib.fleet.cluster import cluster
 from tirelib.fleet.dataset import DataSet
 from tirelib.fleet.sources import Source, find_sources
-from tirelib.observations import observe
+from tirelib.measured.observations import observe
 
 ROOT = Path(__file__).parents[1]
 SAY = Console(highlight=False, soft_wrap=True).print

@@ -24,9 +24,9 @@ from tirelib.core.flags import TurnFlag
 from tirelib.core.threads import one_thread
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
-from tirelib.features import Features
-from tirelib.observations import measure_run, observe
-from tirelib.signal import LowPass
+from tirelib.measured.features import Features
+from tirelib.measured.observations import measure_run, observe
+from tirelib.measured.signal import LowPass
 
 GOALS = {"Fz": 105.0, "alpha": float(np.deg2rad(0.2)), "Fy": 150.0}
 SIZES, LENGTHS, TRIALS = (50e-6, 630e-6), (0.05, 1.5), 6

@@ -34,7 +34,7 @@ from tirelib.estimators.likeness import DRIFT, suspected
 from tirelib.estimators.regressors import SIDED, compute_regressors
 from tirelib.estimators.result import other_tire
 from tirelib.estimators.train import train
-from tirelib.observations import Observations, observe
+from tirelib.measured.observations import Observations, observe
 from tirelib.rig.plans import Plan, plan
 from tirelib.rig.tire import Condition
 

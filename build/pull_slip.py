@@ -1,7 +1,7 @@
 """Slip ratio per unit of pull of the rig's tires: ``python build/pull_slip.py``.
 
 Prints, for three tires at two loads, the slope of the slip ratio over the pull and the constant
-`PULL_SLIP` of `tirelib.signal.slip` that follows. Campaigns are kept in the folder.
+`PULL_SLIP` of `tirelib.measured.signal.slip` that follows. Campaigns are kept in the folder.
 """
 
 import argparse
@@ -12,11 +12,11 @@ import numpy as np
 
 from tirelib.campaign import read_campaign
 from tirelib.core.threads import one_thread
+from tirelib.measured.signal import cut_turns
+from tirelib.measured.signal.slip import pull
 from tirelib.rig.campaign import TRUTH_FILE, run_plan
 from tirelib.rig.plans import Plan
 from tirelib.rig.tire import TIRES, Condition, tire
-from tirelib.signal import cut_turns
-from tirelib.signal.slip import pull
 
 LOADS, SLIPS = (3000.0, 6000.0), (-0.03, -0.015, 0.0, 0.015, 0.03)
 PULLED = Plan(

@@ -29,11 +29,11 @@ from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.edge import EDGE_UNIT
 from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import TWO_SIGMA
-from tirelib.observations import measure_run, observe
+from tirelib.measured.observations import measure_run, observe
+from tirelib.measured.signal import LowPass
 from tirelib.rig.campaign import TRUTH_FILE, run_plan
 from tirelib.rig.plans import Plan, plan
 from tirelib.rig.tire import Condition, tire
-from tirelib.signal import LowPass
 
 KMH, LOADS = 1.0 / 3.6, (3000.0, 4800.0, 6600.0)
 STRAIGHT = Plan(

@@ -19,13 +19,13 @@ from matplotlib.figure import Figure
 from tirelib.core.compiled import choose_numpy
 from tirelib.core.threads import one_thread
 from tirelib.estimators.calibration_file import read_calibration
-from tirelib.features.extract import extract_features
 from tirelib.fmu.virtual.options import Options
 from tirelib.fmu.virtual.spec import default_surface
 from tirelib.fmu.virtual.surface import read_surface
 from tirelib.fmu.virtual.wheel import VirtualWheel
-from tirelib.signal import LowPass, angle, cut_turns, slip, turns
-from tirelib.signal.angle import angle_law
+from tirelib.measured.features.extract import extract_features
+from tirelib.measured.signal import LowPass, angle, cut_turns, slip, turns
+from tirelib.measured.signal.angle import angle_law
 
 ROOT = Path(__file__).parents[1]
 RATE, SAMPLES = 1e4, 20

@@ -30,7 +30,7 @@ from tirelib.estimators.edge import EDGE_UNIT
 from tirelib.estimators.likeness import DRIFT
 from tirelib.estimators.regressors import SIDED, compute_regressors
 from tirelib.estimators.unknowns import UNDER_GROOVES
-from tirelib.observations import Observations, mean_by, observe
+from tirelib.measured.observations import Observations, mean_by, observe
 from tirelib.rig.plans import Plan
 from tirelib.rig.tire import NEW_DEPTH, Condition
 

@@ -28,7 +28,7 @@ from tirelib.estimators.edge import EDGE_UNIT
 from tirelib.estimators.result import TRUTH
 from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import DEPTH, FRICTION, TWO_SIGMA
-from tirelib.observations import ROAD, Observations, observe
+from tirelib.measured.observations import ROAD, Observations, observe
 from tirelib.report.style import BLUE, ORANGE, new_figure, save, styled
 from tirelib.rig.campaign import run_plan
 from tirelib.rig.plans import Plan, plan

@@ -24,10 +24,10 @@ from tirelib.core.threads import one_thread
 from tirelib.estimators import contact_length
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.contact_length import contact_lengths
-from tirelib.features.extract import extract_features
-from tirelib.observations import observe
-from tirelib.signal import contacts, cut_turns
-from tirelib.signal import turns as turns_module
+from tirelib.measured.features.extract import extract_features
+from tirelib.measured.observations import observe
+from tirelib.measured.signal import contacts, cut_turns
+from tirelib.measured.signal import turns as turns_module
 
 LENGTH = ("BIAS", "MIDDLE", "WIDTH", "LEAST_STD", "SHORT_STD", "SHORT_WIDTH")
 SHORT, LONG = 40, 200

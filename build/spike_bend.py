@@ -23,8 +23,8 @@ from tirelib.core.compiled import choose_numpy
 from tirelib.core.flags import TurnFlag
 from tirelib.core.threads import one_thread
 from tirelib.estimators.calibration_file import read_calibration
-from tirelib.observations import measure_run
-from tirelib.signal import LowPass, quality
+from tirelib.measured.observations import measure_run
+from tirelib.measured.signal import LowPass, quality
 
 THINNED = (1, 2, 5, 10)
 MARGIN = 20

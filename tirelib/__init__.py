@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from tirelib.fmu.build import build_fmu
     from tirelib.fmu.check import check_fmu
     from tirelib.journey import add, compare, diagnose, identify, simulate
-    from tirelib.observations import observe
+    from tirelib.measured.observations import observe
     from tirelib.stream import StreamEstimator
     from tirelib.tables import candidate_table, estimate_table, feature_table, parameter_table
 
@@ -72,7 +72,7 @@ _HOMES = {
     "feature_table": "tirelib.tables",
     "identify": "tirelib.identify",
     "import_campaign": "tirelib.campaign.importing.importer",
-    "observe": "tirelib.observations",
+    "observe": "tirelib.measured.observations",
     "parameter_table": "tirelib.tables",
     "read_calibration": "tirelib.estimators.calibration_file",
     "read_campaign": "tirelib.campaign",

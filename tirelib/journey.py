@@ -131,7 +131,7 @@ def diagnose(
     from tirelib.diagnose.diagnose import diagnose as diagnose_strain
     from tirelib.diagnose.document import assess
     from tirelib.identify.campaign_data import straight_runs
-    from tirelib.waveforms import measure_waveforms
+    from tirelib.measured.waveforms import measure_waveforms
 
     given = model_of(model, catalogue)
     has, strengths = given.of_strain

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tirelib.diagnose.document import Assessment
     from tirelib.diagnose.forces.assess import ForceAssessment
     from tirelib.estimators.calibration import Estimates
-    from tirelib.observations import Observations
+    from tirelib.measured.observations import Observations
 
 UNITS = {"time": "s", "Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
 SI_UNITS = {
@@ -40,9 +40,9 @@ def feature_table(observed: "Observations") -> "pd.DataFrame":
     -------
     DataFrame
         A row for each turn and gage, n times the number of gages; ``run`` and the columns of
-        `tirelib.features.table.feature_frame`.
+        `tirelib.measured.features.table.feature_frame`.
     """
-    from tirelib.features.table import feature_frame, units
+    from tirelib.measured.features.table import feature_frame, units
 
     table = feature_frame(observed.features, campaign=observed.campaign, run=observed.run)
     table.attrs["units"] = dict(units())

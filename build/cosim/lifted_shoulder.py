@@ -20,9 +20,9 @@ from cosim.calibrate import plans
 from tirelib.campaign import read_campaign
 from tirelib.core.arrays import FloatArray
 from tirelib.core.threads import one_thread
-from tirelib.observations import observe
+from tirelib.measured.observations import observe
+from tirelib.measured.signal import quality
 from tirelib.rig.campaign import TRUTH_FILE
-from tirelib.signal import quality
 
 SHARES = (0.0, 0.1, 0.12, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.7)
 """Lower ends of the rows, over the median gage's steepness."""

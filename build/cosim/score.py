@@ -21,7 +21,7 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.fmu.virtual.coordinates import FRICTION, half_angle
 from tirelib.fmu.virtual.spec import friction_surface
 from tirelib.fmu.virtual.surface import Surface, read_surface
-from tirelib.signal.lowpass import DEFAULT_ORDER, HALF_POWER, SUPPORT
+from tirelib.measured.signal.lowpass import DEFAULT_ORDER, HALF_POWER, SUPPORT
 
 LIMITS: Mapping[str, float] = MappingProxyType({"Fz": 3.0, "alpha": 0.25, "kappa": 0.01, "Fy": 5.0})
 """Error (rms) to reach: Fz [% of static load], alpha [deg], kappa [1], Fy [% of peak]."""

@@ -20,12 +20,12 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.threads import one_thread
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.calibration_file import read_calibration
-from tirelib.features.extract import extract_features
+from tirelib.measured.features.extract import extract_features
+from tirelib.measured.signal import LowPass, cut_turns
 from tirelib.rig.laws import WaterWedge
 from tirelib.rig.observe import contact, trace
 from tirelib.rig.solve import State, solve
 from tirelib.rig.tire import NEW_DEPTH, Condition, RigTire, tire
-from tirelib.signal import LowPass, cut_turns
 
 DENSITY = 1000.0
 """Density of water [kg/m^3]."""

@@ -24,10 +24,10 @@ from tirelib.core.errors import TirelibError
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
 from tirelib.identify.waveform_fit import WaveformFit
+from tirelib.measured.waveforms import Waveforms
 from tirelib.model.slopes import slopes_of
 from tirelib.rig.hidden import HIDDEN
 from tirelib.rig.observe import Trace
-from tirelib.waveforms import Waveforms
 
 NONE = "none"
 VERSION = 7

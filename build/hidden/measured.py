@@ -15,6 +15,8 @@ import numpy as np
 
 from hidden.plan import Day, day
 from tirelib.core.arrays import FloatArray
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import CONDITIONS, N_PHI, Waveforms
 from tirelib.rig.campaign import rig_header
 from tirelib.rig.hidden import HIDDEN
 from tirelib.rig.measure import gages
@@ -23,8 +25,6 @@ from tirelib.rig.observe import Trace, edges, trace
 from tirelib.rig.shown import Shown
 from tirelib.rig.solve import State, solve
 from tirelib.rig.tire import N_STRIPS, Condition, RigTire
-from tirelib.signal import LowPass
-from tirelib.waveforms import CONDITIONS, N_PHI, Waveforms
 
 CACHE = Path(__file__).parents[1] / "out" / "hidden"
 MESH = (0.015, 0.15)

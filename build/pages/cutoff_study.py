@@ -16,9 +16,9 @@ from tirelib.campaign import Campaign, Run, RunPlan
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
 from tirelib.core.flags import TurnFlag
-from tirelib.features.extract import Features, extract_features
-from tirelib.signal import LowPass, cut_turns
-from tirelib.signal.lowpass import SUITABLE_ORDERS
+from tirelib.measured.features.extract import Features, extract_features
+from tirelib.measured.signal import LowPass, cut_turns
+from tirelib.measured.signal.lowpass import SUITABLE_ORDERS
 
 ORDERS = np.geomspace(1.05 * SUITABLE_ORDERS[0], SUITABLE_ORDERS[1] / 1.05, 15)
 """Cut-offs that are tried, cycles per turn: all that are allowed; others give no features."""

@@ -19,14 +19,14 @@ from tirelib.campaign import Campaign, RunPlan, read_campaign
 from tirelib.core.errors import CalibrationError
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.train import Trained, train
-from tirelib.observations import Observations, observe
+from tirelib.measured.observations import Observations, observe
+from tirelib.measured.signal import LowPass
 from tirelib.report import figures
 from tirelib.report.accuracy import QUANTITIES, Accuracy, accuracy, compare
 from tirelib.report.calibration import regression_drawings
 from tirelib.report.estimate import accuracy_table
 from tirelib.report.figures.regression import find_regression, in_use, rms
 from tirelib.report.page import DASH, Drawing, Section, Table, draw_all, number, write_page
-from tirelib.signal import LowPass
 
 NEEDED = ("set1", "set1-unseen")
 OPTIONAL = ("set2", "brake_drive", "brake_drive-unseen", "set3")

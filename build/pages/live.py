@@ -20,9 +20,9 @@ from pages.figures.live import LastTurn, Strip, figure_live
 from tirelib.campaign import Campaign
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import CalibrationError
+from tirelib.measured.signal import LowPass, cut_turns
 from tirelib.report.accuracy import QUANTITIES
 from tirelib.report.page import Drawing, Table
-from tirelib.signal import LowPass, cut_turns
 
 IN_REPORT = {"Fz": 1.0, "alpha": 1.0, "kappa": 100.0, "Fy": 1.0}
 """From the unit of the document to that of reports: a slip ratio is given in percent."""

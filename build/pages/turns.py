@@ -9,8 +9,8 @@ import numpy as np
 from tirelib.campaign import Campaign, RunPlan, conditions_of
 from tirelib.core.errors import CalibrationError
 from tirelib.core.traces import Conditions, StrainTrace
-from tirelib.features import Features, concatenate_features, extract_features
-from tirelib.signal import LowPass, Turns, cut_turns
+from tirelib.measured.features import Features, concatenate_features, extract_features
+from tirelib.measured.signal import LowPass, Turns, cut_turns
 
 
 @dataclass(frozen=True, slots=True)

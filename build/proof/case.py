@@ -14,13 +14,13 @@ from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.parameters import Tire
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import estimated
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import Waveforms
 from tirelib.model.base import operating_points, values_of
 from tirelib.model.solution import solved
 from tirelib.model.state import Operating
 from tirelib.rig.solve import inflated
 from tirelib.rig.tire import RigTire
-from tirelib.signal import LowPass
-from tirelib.waveforms import Waveforms
 
 LOAD, PRESSURE = 4800.0, 2.1e5
 """Load and pressure of the press test."""

@@ -8,10 +8,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from tirelib.campaign import read_campaign
+from tirelib.measured.waveforms import Waveforms, measure_waveforms
 from tirelib.rig.campaign import run_plan
 from tirelib.rig.plans import KMH, REFERENCE_LOAD, Plan
 from tirelib.rig.tire import Condition, RigTire
-from tirelib.waveforms import Waveforms, measure_waveforms
 
 CACHE = Path(__file__).parents[1] / "out" / "proof"
 _CONDITIONS = (

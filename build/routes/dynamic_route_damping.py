@@ -29,9 +29,9 @@ from routes.static_route_fit import Parameter, Quantity, fit_few
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
 from tirelib.identify.campaign_data import StraightRuns
+from tirelib.measured.signal import LowPass
 from tirelib.model.base import operating_points
 from tirelib.model.state import Operating
-from tirelib.signal import LowPass
 
 TRIALS = (0.0, 0.06, 0.12)
 """Damping ratios (law "sidewall") at which the model is solved; a parabola lies between."""

@@ -15,10 +15,10 @@ from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import CalibrationError, ConvergenceError, ParameterError
 from tirelib.core.parameters import TireFile
 from tirelib.identify.campaign_data import StraightRuns
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import operating_points, values_of
 from tirelib.model.state import State
 from tirelib.ring.compliance import compliance
-from tirelib.waveforms import GRID
 
 N_MODES = 60
 OUTER = 2

@@ -10,10 +10,10 @@ from tirelib.contact.exact import load_exact
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.identify.campaign_data import StraightRuns
+from tirelib.measured.waveforms import GRID
 from tirelib.model.state import Operating, State
 from tirelib.ring.compliance import compliance
 from tirelib.ring.frequencies import rim_stiffness
-from tirelib.waveforms import GRID
 
 N_MODES = 60
 SAME_SERIES = 0.06

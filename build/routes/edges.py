@@ -21,11 +21,11 @@ from routes.correction import Correction, predict_with
 from tirelib.contact.exact import load_exact
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import CalibrationError, ShapeError
-from tirelib.features.peaks import peak
+from tirelib.measured.features.peaks import peak
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import predict, smoothed
 from tirelib.model.state import Operating
-from tirelib.signal import LowPass
-from tirelib.waveforms import GRID
 
 FINER = 4
 """Grid refinement (by Fourier series, exact for the filtered strain) before peaks are read."""

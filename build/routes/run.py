@@ -28,7 +28,7 @@ from tirelib.core.parameters import read_tire
 from tirelib.core.threads import one_thread
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import start_file
-from tirelib.waveforms import measure_waveforms
+from tirelib.measured.waveforms import measure_waveforms
 
 FORMAT = "routes/1"
 

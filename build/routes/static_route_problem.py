@@ -9,15 +9,15 @@ from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.core.parameters import TireFile
 from tirelib.identify.campaign_data import StraightRuns
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID
 from tirelib.ring.green import modal_response
-from tirelib.signal import LowPass
 from tirelib.strain.deformation import (
     arc_nodes,
     contact_deformation,
     series_strain,
     symmetric_series,
 )
-from tirelib.waveforms import GRID
 
 TERMS = 60
 """Harmonics of strain and of the ring's deformation."""

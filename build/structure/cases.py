@@ -14,8 +14,8 @@ import numpy as np
 
 from tirelib.campaign import CampaignHeader, TireGeometry, Tolerance
 from tirelib.core.arrays import BoolArray
-from tirelib.signal import LowPass
-from tirelib.waveforms import Waveforms
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import Waveforms
 
 NONE = "none"
 _PLAIN = ("run", "turns", "scatter", "angle_std", "start", "group")

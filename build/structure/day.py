@@ -17,8 +17,8 @@ from continuum.tire import Condition
 from structure.family import LATERAL, PHI, Array, Frame, Setting
 from tirelib.campaign import CampaignHeader, TireGeometry, Tolerance
 from tirelib.core.arrays import IntArray
-from tirelib.signal import LowPass
-from tirelib.waveforms import CONDITIONS, N_PHI, Waveforms
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import CONDITIONS, N_PHI, Waveforms
 
 TURNS = 4
 RIG_SAMPLES = 50

@@ -17,7 +17,7 @@ from structure.day import Day, day, measured
 from structure.family import Array, Family, Frame
 from structure.ratio import Yard
 from tirelib.core.errors import ParameterError
-from tirelib.waveforms import Waveforms
+from tirelib.measured.waveforms import Waveforms
 
 ROUNDS = 14
 ACCEPTED = 0.05

@@ -17,9 +17,9 @@ from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.delay import by_delay
 from tirelib.identify.identify import estimated
 from tirelib.identify.random_effects import Whitening, scales, tangents, whitening_of
+from tirelib.measured.waveforms import Waveforms
 from tirelib.model.slopes import slopes_of
 from tirelib.model.solution import solved
-from tirelib.waveforms import Waveforms
 
 DELAY_STD = 1.0
 """Standard deviation of the delay, in units of `tirelib.identify.delay`: all but free."""

@@ -19,7 +19,7 @@ from tirebench.estimator.trust import remember
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.train import train
-from tirelib.observations import observe
+from tirelib.measured.observations import observe
 
 TOY = Path(__file__).with_name("toy_slave.py")
 BUILD = Path(__file__).parents[2] / "build"

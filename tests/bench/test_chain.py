@@ -23,7 +23,7 @@ from tirelib.core.flags import TurnFlag
 from tirelib.core.held import HELD
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.result import estimate_document
-from tirelib.observations import observe
+from tirelib.measured.observations import observe
 from tirelib.stream import StreamEstimator
 
 QUANTITIES = ("Fz", "alpha", "kappa", "Fy")

@@ -27,7 +27,7 @@ from tirebench.wire.device import Device
 from tirelib.campaign import check_campaign, read_campaign
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.result import estimate_document
-from tirelib.observations import observe
+from tirelib.measured.observations import observe
 
 
 def write_recording(

@@ -22,7 +22,7 @@ from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.result import estimate_document
 from tirelib.fmu.build import build_fmu
-from tirelib.observations import observe
+from tirelib.measured.observations import observe
 
 SECOND = 112_500
 """Bytes of a second of one wheel."""

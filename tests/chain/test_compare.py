@@ -18,10 +18,10 @@ from tirelib.campaign import Run, RunPlan, write_campaign
 from tirelib.core.parameters import Number, TireFile, write_tire
 from tirelib.identify.brush_model import brush_of
 from tirelib.identify.force_data import ForceData
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import values_of
 from tirelib.model.solution import solved
-from tirelib.signal import LowPass
-from tirelib.waveforms import GRID
 
 NO_FILTER = LowPass(order=120.0)
 

@@ -214,7 +214,7 @@ def test_the_library_refuses_another_tire(campaigns: Path, tmp_path: Path) -> No
     from tirelib.campaign import read_campaign
     from tirelib.core.errors import CalibrationError
     from tirelib.estimators.train import train
-    from tirelib.observations import observe
+    from tirelib.measured.observations import observe
 
     runs = [run for run in cornering_runs() if np.isclose(run.plan.load, 4500.0)]
     calibration = train(observe([read_campaign(campaigns / "set1")])).calibration

@@ -14,7 +14,7 @@ from tirelib.cli import program
 from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import read_tire, write_tire
 from tirelib.effects import CATALOGUE
-from tirelib.waveforms import Waveforms
+from tirelib.measured.waveforms import Waveforms
 
 MINE = """
 from tirelib.effects import effect

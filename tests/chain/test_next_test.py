@@ -20,7 +20,7 @@ from tirelib.cli import program
 from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import write_tire
 from tirelib.effects import CATALOGUE
-from tirelib.waveforms import Waveforms
+from tirelib.measured.waveforms import Waveforms
 
 
 @pytest.fixture(autouse=True)

@@ -17,7 +17,7 @@ from tirelib.core.flags import TurnFlag
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained, take, train
-from tirelib.observations import Observations, observe
+from tirelib.measured.observations import Observations, observe
 from tirelib.rig.campaign import run_plan
 from tirelib.rig.plans import Plan
 from tirelib.rig.tire import TIRES, Condition

@@ -13,11 +13,11 @@ from tirelib.estimators.chain import Chain
 from tirelib.estimators.estimate import Estimate
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.unknowns import FRICTION, TWO_SIGMA
-from tirelib.features import concatenate_features, extract_features
 from tirelib.fmu.virtual.spec import friction_surface
 from tirelib.fmu.virtual.surface import read_surface
-from tirelib.observations import TRUTH, Observations
-from tirelib.signal import cut_turns
+from tirelib.measured.features import concatenate_features, extract_features
+from tirelib.measured.observations import TRUTH, Observations
+from tirelib.measured.signal import cut_turns
 
 RATE, SPEED, PRESSURE, DRY = 1e4, 65.0 / 3.6, 2.3e5, 0.95
 HEADER = CampaignHeader(

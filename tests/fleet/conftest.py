@@ -13,7 +13,7 @@ from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.train import train
-from tirelib.observations import observe
+from tirelib.measured.observations import observe
 
 
 @pytest.fixture(scope="session")

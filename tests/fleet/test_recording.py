@@ -15,8 +15,8 @@ from tirelib.cli import program
 from tirelib.core.errors import FormatError
 from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.continuous import estimate_recording
-from tirelib.features.extract import extract_features
-from tirelib.signal import LowPass, cut_turns
+from tirelib.measured.features.extract import extract_features
+from tirelib.measured.signal import LowPass, cut_turns
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from tirelib.estimators.typical import typical_turn
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.native import core_file
 from tirelib.fmu.run import LoadedFmu
-from tirelib.observations import observe
+from tirelib.measured.observations import observe
 
 RATE = 5000.0
 SPEED = 18.0

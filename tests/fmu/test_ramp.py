@@ -16,12 +16,12 @@ from tirelib.core.held import HELD
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.train import train
-from tirelib.features.extract import Features, extract_features
 from tirelib.fmu.run import LoadedFmu
 from tirelib.fmu.virtual.options import Options
 from tirelib.fmu.virtual.wheel import VirtualWheel
-from tirelib.observations import observe
-from tirelib.signal import LowPass, cut_turns
+from tirelib.measured.features.extract import Features, extract_features
+from tirelib.measured.observations import observe
+from tirelib.measured.signal import LowPass, cut_turns
 from tirelib.stream import StreamEstimator
 
 SOURCES = {"omega": ("speed", "omega"), "speed": ("speed",), "turns": ()}

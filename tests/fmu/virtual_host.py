@@ -19,7 +19,7 @@ from tirelib.estimators.train import train
 from tirelib.fmu.run import keeping
 from tirelib.fmu.virtual.spec import build_virtual, default_surface, friction_surface
 from tirelib.fmu.virtual.surface import Surface, mirrored, read_surface
-from tirelib.observations import observe
+from tirelib.measured.observations import observe
 from tirelib.rig.observe import Forces, forces, trace
 from tirelib.rig.solve import State, solve
 from tirelib.rig.tire import Condition, tire

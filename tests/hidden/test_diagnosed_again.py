@@ -11,7 +11,7 @@ from tirelib.diagnose.diagnose import Diagnosis, diagnose
 from tirelib.effects import CATALOGUE
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.identify import estimated
-from tirelib.waveforms import measure_waveforms
+from tirelib.measured.waveforms import measure_waveforms
 
 DATA = Path(__file__).parent / "data"
 

@@ -8,12 +8,12 @@ from hidden.measured import Plain, traces, waveforms
 from hidden.plan import LOADS, PRESSURES, SPEEDS, Day, day, tire
 
 from tirelib.campaign import read_campaign
+from tirelib.measured.waveforms import measure_waveforms
 from tirelib.rig.campaign import run_plan
 from tirelib.rig.measure import MeasuringChain
 from tirelib.rig.plans import Plan
 from tirelib.rig.solve import solve
 from tirelib.rig.tire import Condition, RigTire
-from tirelib.waveforms import measure_waveforms
 
 EXACT = MeasuringChain(
     load_setting=0.0,

@@ -15,11 +15,11 @@ from tirelib.identify.literature import literature
 from tirelib.identify.random_effects import scales, tangents
 from tirelib.infer.posterior import posterior
 from tirelib.infer.problem import Point
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import move
 from tirelib.problems.strain import StrainProblem
 from tirelib.problems.whiten_strain import Whitener
-from tirelib.signal import LowPass
-from tirelib.waveforms import GRID
 
 CASE = Path(__file__).parent / "data" / "1001-none.npz"
 OWN = 0.001

@@ -13,10 +13,10 @@ import pytest
 
 from tirelib.core.compiled import FEATURE_ROWS, TURN_SCALARS, FeatureStruct, TurnStruct, columns_of
 from tirelib.core.held import HELD
-from tirelib.features.extract import Features
-from tirelib.signal import LowPass, Turn
-from tirelib.signal.compiled import low_pass_struct
-from tirelib.signal.turns import PHI
+from tirelib.measured.features.extract import Features
+from tirelib.measured.signal import LowPass, Turn
+from tirelib.measured.signal.compiled import low_pass_struct
+from tirelib.measured.signal.turns import PHI
 
 SOURCE = Path(__file__).parents[2] / "fmu_src" / "core"
 FLAGS = (*native_fmu.C99, *native_fmu.STRICT, "-Wconversion", "-Wno-sign-conversion")

@@ -10,7 +10,7 @@ from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.compiled import NOTES, ROLLING
 from tirelib.estimators.core_table import flat_table
 from tirelib.estimators.estimate import QUANTITIES
-from tirelib.features.extract import Features
+from tirelib.measured.features.extract import Features
 
 SIZE = {"Fz": 1e2, "alpha": 1e-2, "kappa": 1e-2, "Fy": 1e2}
 """Usual size of a quantity, SI, of which 1e-9 is as good as none."""

@@ -19,15 +19,15 @@ from tirelib.core.errors import FormatError, ParameterError, ShapeError
 from tirelib.core.held import HELD
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.compiled import core_calibration
-from tirelib.features import (
+from tirelib.measured.features import (
     Features,
     RecordReader,
     concatenate_features,
     extract_features,
     features_of_record,
 )
-from tirelib.features.extract import reference_features
-from tirelib.signal import TurnCutter, Turns, cut_turns, stack_turns
+from tirelib.measured.features.extract import reference_features
+from tirelib.measured.signal import TurnCutter, Turns, cut_turns, stack_turns
 from tirelib.stream import StreamEstimator
 from tirelib.stream.compiled import CompiledEstimator
 from tirelib.stream.reference import NumpyEstimator

@@ -20,10 +20,10 @@ from tirelib.estimators.core_table import flat_table
 from tirelib.estimators.polynomial import Polynomial, Variable
 from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import Road
-from tirelib.features import Features
-from tirelib.features.extract import reference_features
-from tirelib.observations import observe
-from tirelib.signal import TurnCutter, stack_turns
+from tirelib.measured.features import Features
+from tirelib.measured.features.extract import reference_features
+from tirelib.measured.observations import observe
+from tirelib.measured.signal import TurnCutter, stack_turns
 
 SLIPS = (-0.3, -0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1, 0.3)
 MOMENT = Polynomial(

@@ -13,8 +13,8 @@ from tests.native.core import CoreError, NativeCutter, assert_same_features, ass
 from tests.synthetic import LATERAL, RATE, record, waveform
 from tirelib.core.errors import ParameterError
 from tirelib.core.flags import TurnFlag
-from tirelib.features.extract import reference_features
-from tirelib.signal import LowPass, TurnCutter, stack_turns
+from tirelib.measured.features.extract import reference_features
+from tirelib.measured.signal import LowPass, TurnCutter, stack_turns
 
 SEQUENCES = int(os.environ.get("TIRELIB_SEQUENCES", "100"))
 SPEED = 18.0

@@ -12,15 +12,15 @@ from tirelib.contact.strips import RoadForces, StripContact, press_strips
 from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.core.parameters import Tire
 from tirelib.core.traces import StrainTrace
-from tirelib.features.extract import Features, extract_features
-from tirelib.observations import measure_run
+from tirelib.measured.features.extract import Features, extract_features
+from tirelib.measured.observations import measure_run
+from tirelib.measured.signal import LowPass
+from tirelib.measured.signal.lowpass import smooth_to_angle
+from tirelib.measured.signal.turns import Turns
 from tirelib.rig.observe import forces
 from tirelib.rig.observe import trace as rig_trace
 from tirelib.rig.solve import State, solve
 from tirelib.rig.tire import Condition, RigTire
-from tirelib.signal import LowPass
-from tirelib.signal.lowpass import smooth_to_angle
-from tirelib.signal.turns import Turns
 from tirelib.strain.gages import gage_harmonics, gage_trace
 from tirelib.strain.innerliner import strain_harmonics
 

@@ -10,10 +10,10 @@ from tirelib.campaign.model import TireGeometry
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import Number, Tire, TireFile, read_tire
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import CONDITIONS, Waveforms
 from tirelib.model.base import operating_points, predict, values_of
 from tirelib.model.solution import solved
-from tirelib.signal import LowPass
-from tirelib.waveforms import CONDITIONS, Waveforms
 
 BAR = 1e5
 KMH = 1.0 / 3.6

@@ -14,11 +14,11 @@ from tirelib.contact.static import StaticTire, press_to_load
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
 from tirelib.identify.campaign_data import StraightRuns
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import operating_points, smoothed
 from tirelib.ring.green import modal_response, pressed_shape
-from tirelib.signal import LowPass
 from tirelib.strain.full_turn import full_ring_deformation
-from tirelib.waveforms import GRID
 
 EI, K_U, RATE, K_T = 12.0, 1.1e6, -4.0, 7.5e7
 TRUE = tire()

@@ -13,9 +13,9 @@ from scipy.signal import butter, sosfiltfilt
 
 from tests.synthetic import LATERAL, RATE, record, synthetic_run, write
 from tirelib.campaign import read_campaign
-from tirelib.features import extract_features
-from tirelib.observations import observe
-from tirelib.signal import cut_turns
+from tirelib.measured.features import extract_features
+from tirelib.measured.observations import observe
+from tirelib.measured.signal import cut_turns
 
 pytestmark = pytest.mark.speed
 TURNS = 20

@@ -15,9 +15,9 @@ from tirelib.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.identify import estimated
 from tirelib.identify.waveform_fit import Prior, fit_waveforms
+from tirelib.measured.signal import LowPass
 from tirelib.model.base import BARE, FREE, values_of
 from tirelib.model.solution import solved
-from tirelib.signal import LowPass
 
 pytestmark = pytest.mark.speed
 GOALS = {19: 3.0, 60: 10.0}

@@ -32,7 +32,7 @@ from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.train import train
 from tirelib.fmu.build import build_fmu
-from tirelib.observations import observe
+from tirelib.measured.observations import observe
 
 pytestmark = pytest.mark.speed
 PATIENCE = 60.0

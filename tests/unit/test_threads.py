@@ -25,7 +25,7 @@ from tirelib.extend.force_extension import extended_brush
 from tirelib.identify.forces import identify_forces
 from tirelib.identify.identify import identify
 from tirelib.identify.whole import identify_whole
-from tirelib.observations import observe
+from tirelib.measured.observations import observe
 from tirelib.planning.next_test import next_test
 from tirelib.planning.selftest import selftest
 from tirelib.report.simulation import simulate

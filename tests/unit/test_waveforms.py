@@ -9,8 +9,8 @@ import pytest
 from tests.synthetic import synthetic_run, waveform, write
 from tirelib.campaign import read_campaign
 from tirelib.core.errors import CalibrationError
-from tirelib.signal import LowPass
-from tirelib.waveforms import GRID, N_PHI, Waveforms, measure_waveforms
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID, N_PHI, Waveforms, measure_waveforms
 
 LOADS = (2500.0, 4000.0, 5500.0)
 

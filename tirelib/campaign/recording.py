@@ -30,8 +30,8 @@ FILE = "recording.toml"
 BLOCK = 1 << 17
 """Samples of a block. With five gages half of it takes 2.5 MB and as long; double takes 10 MB."""
 LONGEST_GAP = 3.0
-"""Gap that is filled with missing samples, [s]: no turn is longer (`tirelib.signal.turns`), so
-after a longer one nothing of the turn before it is left."""
+"""Gap that is filled with missing samples, [s]: no turn is longer
+(`tirelib.measured.signal.turns`), so after a longer one nothing of the turn before it is left."""
 _KEYS = frozenset({"format", "name", "axes", "files", "wheels"})
 _WHEEL_KEYS = frozenset({"tire", "lateral_m", "strain", "trigger", "conditions"})
 

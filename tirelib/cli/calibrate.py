@@ -41,7 +41,7 @@ from tirelib.estimators.mixed import strangers
 from tirelib.estimators.result import cost_rows
 from tirelib.estimators.train import Trained, train
 from tirelib.estimators.typical import typical_turn
-from tirelib.observations import Observations, observe
+from tirelib.measured.observations import Observations, observe
 
 FORMAT = "tirelib-calibrate/1"
 

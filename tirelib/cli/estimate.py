@@ -31,8 +31,8 @@ from tirelib.estimators.continuous_document import Totals, TurnsInJson
 from tirelib.estimators.costs import costs_of
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.turn_table import TurnTable
-from tirelib.observations import geometry_of, observe
-from tirelib.signal import LowPass
+from tirelib.measured.observations import geometry_of, observe
+from tirelib.measured.signal import LowPass
 
 _EXAMPLE = """\b
 Examples:

@@ -17,8 +17,8 @@ from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.core.documents import new_file
 from tirelib.core.errors import FormatError
 from tirelib.core.flags import TurnFlag
-from tirelib.observations import Observations, observe
-from tirelib.signal import LowPass
+from tirelib.measured.observations import Observations, observe
+from tirelib.measured.signal import LowPass
 
 FORMAT = "tirelib-features/1"
 
@@ -50,7 +50,7 @@ def features(
     folder: Path, target: Path, order: float | None, cut_off: float | None, json_file: Path | None
 ) -> None:
     """Extract contact edges, peaks and integrals for every turn and gage of DIR."""
-    from tirelib.features.table import feature_frame, units  # with pandas
+    from tirelib.measured.features.table import feature_frame, units  # with pandas
 
     if target.suffix not in (".parquet", ".csv"):
         raise FormatError(f"{target}: ends in {target.suffix!r}; allowed are .parquet and .csv")

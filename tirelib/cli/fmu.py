@@ -29,8 +29,8 @@ from tirelib.fmu.check import check_fmu
 from tirelib.fmu.native import core_file
 from tirelib.fmu.parts import DEFAULT_RATE
 from tirelib.fmu.run import LoadedFmu, play_campaign
-from tirelib.observations import observe
-from tirelib.signal import LowPass
+from tirelib.measured.observations import observe
+from tirelib.measured.signal import LowPass
 
 _GROUP = """\b
 Examples:

@@ -139,13 +139,13 @@ def next_test(
     from tirelib.diagnose.document import assess, diagnosis_document
     from tirelib.identify.campaign_data import straight_runs
     from tirelib.infer.select import Hypotheses
+    from tirelib.measured.waveforms import measure_waveforms
     from tirelib.model.registration import registered_effects
     from tirelib.planning.document import plan_document, plan_test
     from tirelib.planning.envelope import Envelope
     from tirelib.planning.suspects import given_suspects, suspects_of
     from tirelib.problems.strain import StrainProblem
     from tirelib.problems.strain_living import in_base
-    from tirelib.waveforms import measure_waveforms
 
     if diagnosis_file is not None and names is not None:
         raise ParameterError("--diagnosis and --suspects are both given; give one of them")

@@ -85,10 +85,10 @@ def selftest(
     from tirelib.compare.model import model_of
     from tirelib.core.parameters import read_tire
     from tirelib.identify.campaign_data import straight_runs
+    from tirelib.measured.waveforms import measure_waveforms
     from tirelib.model.registration import registered_effects
     from tirelib.planning.selftest import selftest as test_plan
     from tirelib.planning.selftest_document import selftest_document
-    from tirelib.waveforms import measure_waveforms
 
     catalogue = registered_effects(effect_files)
     model = model_of(read_tire(model_name), catalogue)

@@ -11,7 +11,7 @@ from tirelib.core.parameters import TireFile
 from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.identify.force_data import FORCES
-from tirelib.waveforms import Waveforms, measure_waveforms
+from tirelib.measured.waveforms import Waveforms, measure_waveforms
 
 QUANTITIES = ("strain", *FORCES)
 BRUSH = ("bristle_lateral", "bristle_longitudinal", "friction")

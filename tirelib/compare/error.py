@@ -26,10 +26,10 @@ from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.noise import LEAST_NOISE
 from tirelib.identify.random_effects import Whitening, scales, whitening_of
+from tirelib.measured.signal import LowPass
 from tirelib.model.base import operating_points
 from tirelib.model.state import Operating
 from tirelib.rolling.solve import Start
-from tirelib.signal import LowPass
 
 NOISE, MICROSTRAIN = "noise", "ustrain"
 

@@ -12,8 +12,8 @@ from tirelib.compare.model import Model, Prediction
 from tirelib.core.arrays import FloatArray
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.random_effects import Whitening
+from tirelib.measured.waveforms import GRID
 from tirelib.model.state import Operating
-from tirelib.waveforms import GRID
 
 LEAST_ERROR = 1.1
 """Error from which there is a misfit to be shared out."""

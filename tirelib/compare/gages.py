@@ -16,7 +16,7 @@ from tirelib.compare.sentences import amount, extent, millimetres, small
 from tirelib.compare.set_points import SetPoints
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.identify.noise import RepeatNoise, repeat_noise
-from tirelib.waveforms import GRID
+from tirelib.measured.waveforms import GRID
 
 
 @dataclass(frozen=True, slots=True)

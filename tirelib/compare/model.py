@@ -10,14 +10,14 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError, FormatError, ParameterError, TirelibError
 from tirelib.core.parameters import TireFile
 from tirelib.effects import CATALOGUE, Effect
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import N_PHI
 from tirelib.model.base import predict, values_of
 from tirelib.model.chain import Change, Changes
 from tirelib.model.slopes import slopes_of
 from tirelib.model.solution import solved
 from tirelib.model.state import Operating, State
 from tirelib.rolling.solve import Start
-from tirelib.signal import LowPass
-from tirelib.waveforms import N_PHI
 
 TRIAL = 1e-3
 """Relative step by which slopes of the linear ring by load and pressure are taken."""

@@ -32,13 +32,13 @@ from tirelib.identify.force_data import FORCES, ForceData, force_data
 from tirelib.identify.force_points import force_points, set_points
 from tirelib.identify.random_effects import scales, whitening_of
 from tirelib.identify.span import span
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID, measure_waveforms
 from tirelib.model.base import coordinates, linearised, operating_points, predict
 from tirelib.model.chain import Changes
 from tirelib.model.slopes import by_values
 from tirelib.model.solution import solved
 from tirelib.model.state import Operating
-from tirelib.signal import LowPass
-from tirelib.waveforms import GRID, measure_waveforms
 
 FORMAT = "tirelib-plot-data/1"
 CONDITIONS = ("pressure", "speed", "slip_angle", "camber", "slip_ratio")

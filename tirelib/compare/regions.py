@@ -16,7 +16,7 @@ from tirelib.compare.runs import Factor
 from tirelib.compare.set_points import SetPoints
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.identify.noise import RepeatNoise
-from tirelib.waveforms import GRID
+from tirelib.measured.waveforms import GRID
 
 LEVEL = 0.01
 """Chance of one false statement or more when only noise and set points differ."""

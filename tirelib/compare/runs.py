@@ -9,7 +9,7 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import CalibrationError
 from tirelib.identify.campaign_data import TYPICAL_TOLERANCE, usable, working_gages
 from tirelib.identify.error_bands import levels
-from tirelib.waveforms import Waveforms
+from tirelib.measured.waveforms import Waveforms
 
 _STEP = {"load": 50.0, "pressure": 5e3, "speed": 1.0 / 3.6}
 """To what levels are rounded: 50 N, 0.05 bar, 1 km/h."""

@@ -8,7 +8,7 @@ from tirelib.compare.runs import Factor
 from tirelib.compare.set_points import SetPoints
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.identify.noise import RepeatNoise
-from tirelib.waveforms import GRID
+from tirelib.measured.waveforms import GRID
 
 SECTORS = (
     "contact",

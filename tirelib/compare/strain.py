@@ -21,8 +21,8 @@ from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.identify.campaign_data import straight_noise
 from tirelib.identify.noise import RepeatNoise
 from tirelib.identify.random_effects import scales
+from tirelib.measured.waveforms import Waveforms
 from tirelib.model.base import operating_points
-from tirelib.waveforms import Waveforms
 
 NO_FIT = 0.5
 """Share of the rms strain that a model leaves from which it does not fit at all."""

@@ -9,7 +9,7 @@ from tirelib.campaign import Tolerance
 from tirelib.compare.model import Prediction
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.identify.random_effects import angle_slope
-from tirelib.waveforms import GRID, Waveforms
+from tirelib.measured.waveforms import GRID, Waveforms
 
 REACH = 0.8
 """Angle within which the contact's ends are looked for, [rad]."""

@@ -16,8 +16,8 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.diagnose.left import Power
 from tirelib.identify.error_bands import levels
 from tirelib.identify.random_effects import angle_slope
+from tirelib.measured.waveforms import GRID
 from tirelib.model.state import Operating
-from tirelib.waveforms import GRID
 
 MOST_TERMS = 3
 """Terms of a guessed law at most."""

@@ -11,8 +11,8 @@ from tirelib.compare.sectors import SECTORS, sectors_of
 from tirelib.compare.sentences import PLACES
 from tirelib.core.arrays import FloatArray
 from tirelib.identify.error_bands import levels
+from tirelib.measured.waveforms import GRID
 from tirelib.model.state import Operating
-from tirelib.waveforms import GRID
 
 FLAT = 0.2
 """Power of a condition below which the residual is said not to change with it."""

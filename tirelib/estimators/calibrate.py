@@ -26,7 +26,7 @@ from tirelib.estimators.ranges import with_ranges
 from tirelib.estimators.regressors import EVEN, ODD, compute_regressors
 from tirelib.estimators.sliding import SlidingCurve
 from tirelib.estimators.unknowns import Road
-from tirelib.observations import TRUTH, Observations, mean_by
+from tirelib.measured.observations import TRUTH, Observations, mean_by
 
 FEWEST_CONDITIONS = 5
 """Distinct conditions below which nothing is calibrated."""

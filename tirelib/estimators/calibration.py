@@ -17,8 +17,8 @@ from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.unknowns import PLAUSIBLE
-from tirelib.features.extract import Features
-from tirelib.signal.quality import UNUSABLE
+from tirelib.measured.features.extract import Features
+from tirelib.measured.signal.quality import UNUSABLE
 
 UNITS = {"Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
 """Unit of each estimated quantity inside the library."""

@@ -21,7 +21,7 @@ from tirelib.core.errors import FormatError
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.core_table import flat_table
 from tirelib.estimators.estimate import QUANTITIES
-from tirelib.features.extract import Features
+from tirelib.measured.features.extract import Features
 
 NOTES = (
     *(f"{quantity}_out_of_range" for quantity in QUANTITIES),

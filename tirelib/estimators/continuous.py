@@ -13,8 +13,8 @@ import numpy as np
 from tirelib.campaign.recording import Block, Recording, Wheel, blocks
 from tirelib.core.arrays import FloatArray
 from tirelib.estimators.calibration import Calibration, Estimates
-from tirelib.features.extract import Features, extract_features
-from tirelib.signal import LowPass, Turn, TurnCutter, Turns, stack_turns
+from tirelib.measured.features.extract import Features, extract_features
+from tirelib.measured.signal import LowPass, Turn, TurnCutter, Turns, stack_turns
 
 RATES_ALIKE = 1e-4
 """Relative difference of two files' sample rates up to which one follows the other: a tenth of what

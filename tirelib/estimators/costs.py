@@ -11,7 +11,7 @@ import numpy as np
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.estimate import QUANTITIES
-from tirelib.features.extract import Features
+from tirelib.measured.features.extract import Features
 
 COLUMN = {
     "camber": "camber_deg",

@@ -13,7 +13,7 @@ from tirelib.estimators.dissertation import FREE, SMALL_ANGLE, UPRIGHT, Means
 from tirelib.estimators.fit import LARGEST_LEVEL
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.train import Trained, take
-from tirelib.observations import Observations, mean_by
+from tirelib.measured.observations import Observations, mean_by
 
 LEVELS = {
     "load": (250.0, "N"),

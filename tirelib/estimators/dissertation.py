@@ -14,8 +14,8 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import CalibrationError
 from tirelib.estimators.folds import held_out_folds
 from tirelib.estimators.least_squares import least_squares
-from tirelib.features.extract import Features
-from tirelib.features.table import rate_slope
+from tirelib.measured.features.extract import Features
+from tirelib.measured.features.table import rate_slope
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.features.extract import Features
+from tirelib.measured.features.extract import Features
 
 ANGLE_STEP = 1e-3
 """Relative step of the wheel angle's scale for the slope over it: small, far above rounding."""

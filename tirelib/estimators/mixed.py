@@ -12,7 +12,7 @@ from tirelib.estimators.likeness_fit import fit_likeness
 from tirelib.estimators.links import VARIES, varying_of
 from tirelib.estimators.regressors import EVEN, ODD, compute_regressors
 from tirelib.estimators.sliding import SlidingCurve
-from tirelib.observations import Observations, mean_by
+from tirelib.measured.observations import Observations, mean_by
 
 BEYOND = {"camber": np.deg2rad(0.5), "slip_angle": np.deg2rad(0.5), "slip_ratio": 0.005}
 """How far (SI) beyond the conditions of a campaign another can still be compared with it."""

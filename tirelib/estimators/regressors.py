@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from tirelib.core.arrays import BoolArray, FloatArray
-from tirelib.features.extract import Features
+from tirelib.measured.features.extract import Features
 
 EVEN = ("contact_angle", "compression", "traction", "tension")
 """Regressors that keep their sign when left and right change places."""

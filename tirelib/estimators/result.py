@@ -16,8 +16,8 @@ from tirelib.estimators.costs import COLUMN, Cost
 from tirelib.estimators.edge import EDGE_UNIT, FORMAT, VARIED
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.likeness import suspected
-from tirelib.features.extract import Features
-from tirelib.observations import Observations, mean_by
+from tirelib.measured.features.extract import Features
+from tirelib.measured.observations import Observations, mean_by
 
 TRUTH = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
 

@@ -14,8 +14,8 @@ from tirelib.estimators.cornering import CorneringTrend, cornering_trend
 from tirelib.estimators.dissertation import Means, Regression, fit_all, means_for_tables
 from tirelib.estimators.links import Links
 from tirelib.estimators.regressors import compute_regressors
-from tirelib.observations import Observations, geometry_of, mean_by
-from tirelib.signal import LowPass
+from tirelib.measured.observations import Observations, geometry_of, mean_by
+from tirelib.measured.signal import LowPass
 
 ROLLING_SIGMAS = 4.0
 """Scatter of free-rolling turns, in standard deviations, that is not called traction."""

@@ -16,8 +16,8 @@ from tirelib.core.flags import flag_names
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.edge import EDGE_UNIT
 from tirelib.estimators.estimate import QUANTITIES
-from tirelib.features.extract import Features
-from tirelib.signal.quality import UNUSABLE
+from tirelib.measured.features.extract import Features
+from tirelib.measured.signal.quality import UNUSABLE
 
 CONDITIONS = {
     "omega": ("rad/s", 1.0),

@@ -8,7 +8,7 @@ from tirelib.campaign import Campaign
 from tirelib.core.arrays import FloatArray
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.reference_turn import ReferenceTurn, folded
-from tirelib.observations import Observations
+from tirelib.measured.observations import Observations
 
 MOST_TRIED = 20
 """Turns that are looked at in the recordings."""

@@ -39,7 +39,7 @@ from tirelib.extend.model_file import extended_file
 from tirelib.extend.step import Step
 from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.force_data import FORCES
-from tirelib.waveforms import measure_waveforms
+from tirelib.measured.waveforms import measure_waveforms
 
 Progress = Callable[[str], None]
 S = TypeVar("S", bound=Step[Any])

@@ -12,9 +12,9 @@ import pyarrow.parquet as pq
 from tirelib import __version__
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.flags import flag_names
-from tirelib.features.table import PER_TURN
-from tirelib.features.table import units as units_of_features
 from tirelib.fleet.tables import SCHEMAS
+from tirelib.measured.features.table import PER_TURN
+from tirelib.measured.features.table import units as units_of_features
 
 MOST_KEPT = 4096
 """Values of a channel from which its percentiles are taken, evenly spaced over the container. With

@@ -17,8 +17,8 @@ from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.polynomial import Range
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.unknowns import PLAUSIBLE
-from tirelib.signal.quality import UNUSABLE
-from tirelib.signal.turns import LARGEST_OMEGA_RATIO
+from tirelib.measured.signal.quality import UNUSABLE
+from tirelib.measured.signal.turns import LARGEST_OMEGA_RATIO
 from tirelib.stream.estimate import TurnEstimate
 
 _RANGE = "= {value}; calibrated are {low} .. {high}; not valid beyond: calibrate there, or check"

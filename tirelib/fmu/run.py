@@ -18,9 +18,9 @@ from tirelib.core.flags import INVALIDATING, flag_names
 from tirelib.core.held import HELD
 from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.estimate import QUANTITIES
-from tirelib.features.extract import Features
 from tirelib.fmu.build import embedded_calibration
-from tirelib.observations import SET_POINTS, TRUTH, Observations, geometry_of, truth_of
+from tirelib.measured.features.extract import Features
+from tirelib.measured.observations import SET_POINTS, TRUTH, Observations, geometry_of, truth_of
 
 
 def keeping(messages: list[str]) -> Any:

@@ -16,7 +16,7 @@ from tirelib.estimators.calibration_file import read_calibration
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.fmu.refusals import FAULT, StepError, status_entry
 from tirelib.fmu.remarks import Remark, remarks
-from tirelib.signal.turns import LONGEST_TURN
+from tirelib.measured.signal.turns import LONGEST_TURN
 from tirelib.stream.estimate import TurnEstimate
 from tirelib.stream.reference import NumpyEstimator
 

@@ -18,10 +18,10 @@ from tirelib.identify.strain_notes import (
     named,
     some_gage_works,
 )
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID, Waveforms
 from tirelib.model.base import operating_points
 from tirelib.model.state import Operating
-from tirelib.signal import LowPass
-from tirelib.waveforms import GRID, Waveforms
 
 __all__ = [
     "LEAST_RUNS",

@@ -24,8 +24,8 @@ from tirelib.identify.next_run import NextRun, next_run
 from tirelib.identify.strain_notes import gage_notes, run_notes
 from tirelib.identify.structure import STRUCTURE_STD, WITHOUT_SHEAR
 from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
+from tirelib.measured.waveforms import Waveforms, measure_waveforms
 from tirelib.model.base import Coordinate, coordinates, values_of
-from tirelib.waveforms import Waveforms, measure_waveforms
 
 WIDEST = 0.25
 """Relative half-width of a 95 % interval up to which a number is called identifiable."""

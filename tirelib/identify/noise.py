@@ -7,7 +7,7 @@ import numpy as np
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.identify.random_effects import tangents
 from tirelib.identify.span import span
-from tirelib.waveforms import Waveforms
+from tirelib.measured.waveforms import Waveforms
 
 SMOOTH = 5
 """Neighbouring orders over which the spectrum is averaged."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from tirelib.campaign import Campaign, RunPlan
 from tirelib.core.arrays import BoolArray, FloatArray
-from tirelib.waveforms import Waveforms
+from tirelib.measured.waveforms import Waveforms
 
 WEAK_GAGE = 0.3
 """A gage below this share of what the others show is broken."""

@@ -18,6 +18,7 @@ from tirelib.identify.delay import STD, UNIT, by_delay, earlier
 from tirelib.identify.discrepancy import Discrepancy
 from tirelib.identify.whiten_runs import RunWhitening
 from tirelib.infer.problem import Point
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import Coordinate, move
 from tirelib.model.chain import Changes
 from tirelib.model.slopes import SolutionSlopes, slopes_of
@@ -25,7 +26,6 @@ from tirelib.model.solution import Solution, solved
 from tirelib.model.state import Operating
 from tirelib.rolling.assemble import Unknowns
 from tirelib.rolling.solve import Rolling
-from tirelib.waveforms import GRID
 
 MISFIT = "misfit"
 """Name of the rows of the structural misfit."""

@@ -8,10 +8,10 @@ import numpy as np
 from tirelib.contact.free_boundary import Start
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import FIELDS, Tire
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID, Waveforms
 from tirelib.model.chain import Changes, waveform
 from tirelib.model.state import Operating, State
-from tirelib.signal import LowPass
-from tirelib.waveforms import GRID, Waveforms
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,9 +14,9 @@ import numpy as np
 from tirelib.contact import radial
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError
+from tirelib.measured.signal import LowPass
 from tirelib.model.state import CONSTANTS, State
 from tirelib.ring.compliance import compliance
-from tirelib.signal import LowPass
 from tirelib.strain.innerliner import strain_harmonics
 
 STAGES = ("constants", "contact", "strain", "gage")

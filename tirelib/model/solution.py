@@ -15,6 +15,8 @@ import numpy as np
 from tirelib.contact.free_boundary import Start
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import smoothed
 from tirelib.model.chain import (
     FIRST_DEPTH,
@@ -34,8 +36,6 @@ from tirelib.rolling.assemble import Unknowns
 from tirelib.rolling.constants import STIFFEST, Constants
 from tirelib.rolling.gage import Gage
 from tirelib.rolling.solve import Rolling, solve
-from tirelib.signal import LowPass
-from tirelib.waveforms import GRID
 
 Values = Mapping[str, float | FloatArray]
 SAME = (

@@ -18,6 +18,7 @@ from tirelib.identify.delay import STD, UNIT, by_delay, earlier
 from tirelib.identify.literature import literature
 from tirelib.identify.random_effects import scales, tangents
 from tirelib.infer.problem import FOLLOWED, Point
+from tirelib.measured.waveforms import GRID
 from tirelib.model import solution
 from tirelib.model.base import coordinates, move
 from tirelib.model.chain import Changes
@@ -36,7 +37,6 @@ from tirelib.problems.strain_living import in_base, living
 from tirelib.problems.whiten_strain import INSIDE, Whitener
 from tirelib.rolling.assemble import Unknowns
 from tirelib.rolling.solve import Rolling
-from tirelib.waveforms import GRID
 
 WIDTH = {
     "bending_stiffness": 0.7,

@@ -13,9 +13,9 @@ from tirelib.identify.discrepancy import (
     Discrepancy,
     bumps,
 )
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import Coordinate
 from tirelib.model.state import Operating, State
-from tirelib.waveforms import GRID
 
 SHAPES = Discrepancy(inside=1.0, outside=0.15, by_load=1.0, by_pressure=1.0, by_speed=1.0)
 """Smooth shapes over the wheel angle."""

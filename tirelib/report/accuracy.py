@@ -11,7 +11,7 @@ import numpy as np
 
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.estimators.calibration import Estimates
-from tirelib.observations import Observations, mean_by
+from tirelib.measured.observations import Observations, mean_by
 
 QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
 TITLE = {

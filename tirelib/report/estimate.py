@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tirelib.core.flags import flag_names
 from tirelib.estimators.calibration import Calibration, Estimates
-from tirelib.observations import Observations
+from tirelib.measured.observations import Observations
 from tirelib.report import figures
 from tirelib.report.accuracy import QUANTITIES, TITLE, Accuracy, accuracies
 from tirelib.report.page import DASH, Drawing, Section, Table, draw_all, number, write_page

@@ -14,6 +14,7 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.core.parameters import FIELDS, Tire
 from tirelib.core.threads import one_thread
+from tirelib.measured.signal import LowPass
 from tirelib.model.base import predict
 from tirelib.model.solution import Solution, solved
 from tirelib.model.state import Operating, State
@@ -25,7 +26,6 @@ from tirelib.report.simulation import (
     points_of,
 )
 from tirelib.ring.ring import ComplexArray
-from tirelib.signal import LowPass
 
 TURN = np.linspace(-np.pi, np.pi, N_ANGLES - 1, endpoint=False)
 """Angles of the curves, the last of which is the first; every fourth is one of `GRID`."""

@@ -4,9 +4,9 @@ Each gage reads its strip's bending (`tirelib.strain.innerliner`), the lateral b
 belt, and, if given, what the tread's shear adds (`tirelib.strain.tread_traction`). The result is
 the same type that a measurement gives, with the same conventions:
 
-- the low-pass is the Gaussian of `tirelib.signal.lowpass`; over harmonics it is a factor;
+- the low-pass is the Gaussian of `tirelib.measured.signal.lowpass`; over harmonics it is a factor;
 - wheel angle zero is the middle of the centre gage's pulse, found in the unfiltered strain at the
-  level that `tirelib.signal.contacts` uses;
+  level that `tirelib.measured.signal.contacts` uses;
 - `axis_shift` is where a trigger that marks the gages at the wheel's top would see it: the model's
   angle is a place in space, and under drive or brake the gage at the road runs ahead of or behind
   the gage at the top by (v(0) - v(pi)) / R;
@@ -23,10 +23,10 @@ from tirelib.contact.layout import StripContact
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.core.traces import Conditions, StrainTrace
+from tirelib.measured.signal.contacts import RISE
+from tirelib.measured.signal.lowpass import LowPass
+from tirelib.measured.signal.turns import OFFSET_HALF_WIDTH, PHI
 from tirelib.ring.ring import ComplexArray
-from tirelib.signal.contacts import RISE
-from tirelib.signal.lowpass import LowPass
-from tirelib.signal.turns import OFFSET_HALF_WIDTH, PHI
 from tirelib.strain.innerliner import strain_harmonics
 
 PULSE_POINTS = 1440

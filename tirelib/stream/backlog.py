@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.signal.contacts import JUMP, ContactFinder
-from tirelib.signal.turns import TurnCutter
+from tirelib.measured.signal.contacts import JUMP, ContactFinder
+from tirelib.measured.signal.turns import TurnCutter
 
 MOST_SAMPLES = 512
 """Samples that are kept at most."""

@@ -22,10 +22,10 @@ from tirelib.core.flags import TurnFlag
 from tirelib.core.held import HELD, Held
 from tirelib.estimators.compiled import core_calibration, estimates_of
 from tirelib.estimators.estimate import QUANTITIES
-from tirelib.features.compiled import attributes_of
-from tirelib.features.extract import Features
-from tirelib.signal.compiled import beyond_samples
-from tirelib.signal.turns import check_gages
+from tirelib.measured.features.compiled import attributes_of
+from tirelib.measured.features.extract import Features
+from tirelib.measured.signal.compiled import beyond_samples
+from tirelib.measured.signal.turns import check_gages
 from tirelib.stream.estimate import TurnEstimate
 from tirelib.stream.estimator import StreamEstimator
 from tirelib.stream.snapshot import from_plain, to_plain

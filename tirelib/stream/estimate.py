@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from tirelib.estimators.calibration import Estimates
-from tirelib.features.extract import Features
+from tirelib.measured.features.extract import Features
 
 
 @dataclass(frozen=True, slots=True)

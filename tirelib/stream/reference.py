@@ -10,10 +10,10 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.flags import TurnFlag
 from tirelib.core.held import HELD, Held
 from tirelib.estimators.estimate import QUANTITIES
-from tirelib.features.extract import reference_features
-from tirelib.signal.lowpass import LowPass
-from tirelib.signal.quality import UNUSABLE
-from tirelib.signal.turns import LONGEST_TURN, Turn, TurnCutter, stack_turns
+from tirelib.measured.features.extract import reference_features
+from tirelib.measured.signal.lowpass import LowPass
+from tirelib.measured.signal.quality import UNUSABLE
+from tirelib.measured.signal.turns import LONGEST_TURN, Turn, TurnCutter, stack_turns
 from tirelib.stream.backlog import Backlog
 from tirelib.stream.estimate import TurnEstimate
 from tirelib.stream.estimator import STANDSTILL, WATCHDOG_TURNS, StreamEstimator

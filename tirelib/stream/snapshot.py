@@ -15,10 +15,10 @@ import numpy as np
 
 from tirelib.core.errors import FormatError
 from tirelib.estimators.calibration import Estimates
-from tirelib.features.extract import Features
-from tirelib.signal.contacts import Contact, ContactFinder
-from tirelib.signal.lowpass import LowPass
-from tirelib.signal.turns import TurnCutter
+from tirelib.measured.features.extract import Features
+from tirelib.measured.signal.contacts import Contact, ContactFinder
+from tirelib.measured.signal.lowpass import LowPass
+from tirelib.measured.signal.turns import TurnCutter
 
 _BUFFER = "_buffer"
 

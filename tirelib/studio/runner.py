@@ -39,7 +39,7 @@ LOADED = (
     "tirelib.identify.forces_document",
     "tirelib.identify.whole",
     "tirelib.model.registration",
-    "tirelib.waveforms",
+    "tirelib.measured.waveforms",
 )
 """Modules that are loaded before the first job: they take most of a command's start."""
 COPIES = sys.platform == "linux"

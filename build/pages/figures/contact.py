@@ -7,7 +7,7 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.train import averaging
-from tirelib.observations import Observations
+from tirelib.measured.observations import Observations
 from tirelib.report.levels import angle_levels, load_levels, reference_level
 from tirelib.report.style import BLUE, FAINT, RED, label, new_figure, styled
 

@@ -1,10 +1,11 @@
-"""Why the low-pass is chosen by order of the turn rate and not in Hz (`tirelib.signal.lowpass`)."""
+"""Why the low-pass of `tirelib.measured.signal.lowpass` is chosen by order and not in Hz."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pages.cutoff_study import CutOffStudy
+from tirelib.measured.signal.lowpass import DEFAULT_ORDER, SUITABLE_ORDERS
 from tirelib.report.style import (
     BLACK,
     BLUE,
@@ -18,7 +19,6 @@ from tirelib.report.style import (
     styled,
     zero_line,
 )
-from tirelib.signal.lowpass import DEFAULT_ORDER, SUITABLE_ORDERS
 
 SPEED_COLOURS = (BLUE, GREEN, ORANGE)
 FIXED = 300.0

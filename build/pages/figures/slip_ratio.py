@@ -7,7 +7,7 @@ from pages.figures.strain import figure_4_17_turns
 from pages.turns import TypicalTurns
 from tirelib.estimators.calibration import Estimates, Rolling
 from tirelib.estimators.regressors import compute_regressors
-from tirelib.observations import Observations
+from tirelib.measured.observations import Observations
 from tirelib.report.accuracy import WIDTH, accuracy, compare
 from tirelib.report.figures.regression import RESIDUAL
 from tirelib.report.style import (

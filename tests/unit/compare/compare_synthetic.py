@@ -9,10 +9,10 @@ from tests.synthetic import header
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import TireFile, read_tire
 from tirelib.identify.random_effects import angle_slope
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import CONDITIONS, GRID, Waveforms
 from tirelib.model.base import Operating, smoothed, values_of
 from tirelib.model.solution import Solution, solved
-from tirelib.signal import LowPass
-from tirelib.waveforms import CONDITIONS, GRID, Waveforms
 
 TOLERANCE = (0.005, 0.002, 0.003)
 """Load, pressure and gain, as in the header."""

@@ -9,8 +9,8 @@ from tests.unit.compare.compare_synthetic import bump, model_file, waveforms
 from tirelib.compare.document import comparison_document
 from tirelib.compare.model import model_of
 from tirelib.compare.strain import Comparison, compare_strain
+from tirelib.measured.waveforms import GRID, Waveforms
 from tirelib.report.comparison import strain_parts
-from tirelib.waveforms import GRID, Waveforms
 
 MODEL = model_of(model_file())
 PLANT, NOISE = 3e-4, 4e-6

@@ -15,7 +15,7 @@ from tirelib.compare.strain import compare_strain
 from tirelib.compare.tracks import contact_angle, pooled
 from tirelib.identify.noise import RepeatNoise
 from tirelib.identify.random_effects import scales
-from tirelib.waveforms import GRID
+from tirelib.measured.waveforms import GRID
 
 MODEL = model_of(model_file())
 

@@ -14,7 +14,7 @@ from tirelib.compare.sectors import SECTORS, sectors_of
 from tirelib.compare.strain import Comparison, compare_strain
 from tirelib.core.errors import CalibrationError, FormatError
 from tirelib.core.parameters import Number, TireFile
-from tirelib.waveforms import GRID, Waveforms
+from tirelib.measured.waveforms import GRID, Waveforms
 
 MODEL = model_of(model_file())
 BIN = 0.05

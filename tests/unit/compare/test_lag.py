@@ -12,7 +12,7 @@ from tirelib.compare.strain import Comparison, compare_strain
 from tirelib.core.arrays import FloatArray
 from tirelib.identify.delay import STD, earlier
 from tirelib.identify.random_effects import Whitening
-from tirelib.waveforms import GRID
+from tirelib.measured.waveforms import GRID
 
 
 def compared(delay: float) -> Comparison:

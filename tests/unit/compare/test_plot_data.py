@@ -21,10 +21,10 @@ from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import Number
 from tirelib.effects import CATALOGUE
 from tirelib.identify.delay import by_delay
+from tirelib.measured.waveforms import measure_waveforms
 from tirelib.model.base import coordinates, operating_points
 from tirelib.model.slopes import by_values
 from tirelib.model.solution import solved
-from tirelib.waveforms import measure_waveforms
 
 
 def like(trace: Any, rest: Any) -> float:

@@ -11,7 +11,7 @@ from tirelib.compare.runs import Factor
 from tirelib.compare.strain import compare_strain
 from tirelib.compare.track_words import track_fit, track_sentences
 from tirelib.compare.tracks import Track, contact_edges, pooled
-from tirelib.waveforms import GRID
+from tirelib.measured.waveforms import GRID
 
 LOADS = np.repeat([1500.0, 3000.0, 4500.0, 6000.0], 6)
 LEVEL = np.repeat(np.arange(4), 6)

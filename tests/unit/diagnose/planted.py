@@ -13,9 +13,9 @@ from tirelib.effects.effect import Strength
 from tirelib.extend.extension import Extension, extended, refuse, strain_models
 from tirelib.extend.model_file import extended_file
 from tirelib.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.measured.waveforms import Waveforms
 from tirelib.model.base import operating_points, values_of
 from tirelib.model.solution import solved
-from tirelib.waveforms import Waveforms
 
 LOADS = (2400.0, 4200.0, 6000.0)
 PRESSURES = (1.7e5, 2.3e5)

@@ -22,10 +22,10 @@ from tirelib.identify.campaign_data import StraightRuns
 from tirelib.identify.delay import UNIT, by_delay, earlier, late
 from tirelib.infer.posterior import Posterior, posterior
 from tirelib.infer.select import Hypotheses
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import BARE, move, values_of
 from tirelib.model.state import State
 from tirelib.problems.strain import WIDTH, StrainProblem
-from tirelib.waveforms import GRID
 
 DELAY = 4e-5
 FIRST_ORDER, SECOND_ORDER = (0.2, 0.02), (0.3, 0.0)

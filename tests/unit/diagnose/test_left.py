@@ -21,9 +21,9 @@ from tirelib.diagnose.left import left_of, told_range
 from tirelib.effects import CATALOGUE
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.infer.select import Hypotheses
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import values_of
 from tirelib.problems.strain import StrainProblem
-from tirelib.waveforms import GRID
 
 
 def base_of(measured: StraightRuns) -> Fitted:

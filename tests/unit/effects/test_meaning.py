@@ -13,13 +13,13 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
 from tirelib.effects.patch import held_shear
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import linearised, predict
 from tirelib.model.solution import solved
 from tirelib.model.state import State
 from tirelib.ring.compliance import compliance
 from tirelib.ring.ring import ComplexArray
-from tirelib.signal import LowPass
-from tirelib.waveforms import GRID
 
 
 def at(name: str, strength: float | tuple[float, ...], **given: Any) -> State:

@@ -6,7 +6,7 @@ import pytest
 from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import Campaign, read_campaign
 from tirelib.estimators.train import Trained, train
-from tirelib.observations import Observations, observe
+from tirelib.measured.observations import Observations, observe
 
 
 @pytest.fixture(scope="session")

@@ -16,8 +16,8 @@ from tirelib.estimators.contact_length import contact_lengths
 from tirelib.estimators.dissertation import fit_all
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained, take, train
-from tirelib.features import Features
-from tirelib.observations import Observations, measure_run, observe, same_tire
+from tirelib.measured.features import Features
+from tirelib.measured.observations import Observations, measure_run, observe, same_tire
 
 
 def features_of(**options: float) -> Features:

@@ -10,7 +10,7 @@ from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.costs import COLUMN, costs_of
 from tirelib.estimators.result import cost_rows, estimate_document
 from tirelib.estimators.train import Trained
-from tirelib.observations import Observations
+from tirelib.measured.observations import Observations
 
 
 def without(observed: Observations, name: str) -> Observations:

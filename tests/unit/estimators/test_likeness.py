@@ -22,8 +22,8 @@ from tirelib.estimators.mixed import strangers
 from tirelib.estimators.regressors import ODD, compute_regressors
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained, take
-from tirelib.features import Features
-from tirelib.observations import Observations, measure_run, observe, same_tire
+from tirelib.measured.features import Features
+from tirelib.measured.observations import Observations, measure_run, observe, same_tire
 
 Regressors = Mapping[str, FloatArray]
 

@@ -15,7 +15,7 @@ from tirelib.estimators.calibration_file import read_calibration, write_calibrat
 from tirelib.estimators.reference_turn import STRAIN_UNIT, ReferenceTurn, folded
 from tirelib.estimators.train import Trained
 from tirelib.estimators.typical import typical_turn
-from tirelib.observations import Observations
+from tirelib.measured.observations import Observations
 from tirelib.stream import StreamEstimator
 
 RATE = 1e4

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tirelib.estimators.regressors import EVEN, ODD, SHAPE, compute_regressors
-from tirelib.features.extract import Features
+from tirelib.measured.features.extract import Features
 
 N, GAGES = 7, 5
 STRAINS = ("cp1", "cp2", "tp", "rate_lead", "rate_trail", "e_vertical")

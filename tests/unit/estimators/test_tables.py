@@ -9,7 +9,7 @@ from tirelib.core.errors import ParameterError
 from tirelib.core.parameters import NUMBERS
 from tirelib.core.units import TABLE, to_si
 from tirelib.estimators.train import Trained
-from tirelib.observations import Observations
+from tirelib.measured.observations import Observations
 from tirelib.tables import SI_UNITS
 
 

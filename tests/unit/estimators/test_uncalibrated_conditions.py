@@ -8,7 +8,7 @@ from tirelib.campaign import Campaign
 from tirelib.cli.limits import extrapolated
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained
-from tirelib.observations import observe
+from tirelib.measured.observations import observe
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from tirelib.estimators.unknowns import (
     Road,
     spread,
 )
-from tirelib.observations import Observations
+from tirelib.measured.observations import Observations
 
 CURVE = SlidingCurve(
     friction=0.95,

@@ -159,7 +159,7 @@ def test_a_camber_that_was_not_calibrated_widens_fy_and_is_soon_out_of_range(
 ) -> None:
     """A tilt of 0.5 deg reads as 200 N of lateral force and more."""
     from tests.synthetic import header, synthetic_run
-    from tirelib.observations import measure_run
+    from tirelib.measured.observations import measure_run
 
     features = measure_run(synthetic_run(0, noise=0.0), header())[0]
 
@@ -180,7 +180,7 @@ def test_a_camber_that_was_not_calibrated_widens_fy_and_is_soon_out_of_range(
 def test_a_bow_needs_three_gages(count: int) -> None:
     from tests.synthetic import header, synthetic_run
     from tirelib.estimators.regressors import compute_regressors
-    from tirelib.observations import measure_run
+    from tirelib.measured.observations import measure_run
 
     features = measure_run(synthetic_run(0, turns=3.0), header())[0]
     found = compute_regressors(features, range(1, 1 + count))

@@ -13,8 +13,8 @@ from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Range
 from tirelib.estimators.train import Trained
-from tirelib.features import Features
-from tirelib.observations import measure_run
+from tirelib.measured.features import Features
+from tirelib.measured.observations import measure_run
 
 
 @pytest.fixture(scope="module")

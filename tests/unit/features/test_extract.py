@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from tests.synthetic import LATERAL, RATE, record
 from tirelib.core.flags import TurnFlag
-from tirelib.features import Features, concatenate_features, extract_features
-from tirelib.features.peaks import peak
-from tirelib.features.table import feature_frame, rate_slope, units
-from tirelib.signal import cut_turns
+from tirelib.measured.features import Features, concatenate_features, extract_features
+from tirelib.measured.features.peaks import peak
+from tirelib.measured.features.table import feature_frame, rate_slope, units
+from tirelib.measured.signal import cut_turns
 
 
 def features_of(*, speed: float = 18.0, **options: float) -> Features:

@@ -9,11 +9,11 @@ from tirelib.campaign import Tolerance
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import Tire
 from tirelib.identify.random_effects import angle_slope
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import CONDITIONS, Waveforms
 from tirelib.model.base import values_of
 from tirelib.model.solution import solved
 from tirelib.model.state import Operating
-from tirelib.signal import LowPass
-from tirelib.waveforms import CONDITIONS, Waveforms
 
 TIRE = Tire(
     ring_radius=0.302,

@@ -8,7 +8,7 @@ import pytest
 from tests.unit.identify.model_waves import LOADS, made_waves
 from tirelib.core.errors import CalibrationError
 from tirelib.identify.campaign_data import STRUCTURE, straight_runs, working_gages
-from tirelib.waveforms import Waveforms
+from tirelib.measured.waveforms import Waveforms
 
 
 @pytest.fixture(scope="module")

@@ -19,10 +19,10 @@ from tirelib.identify.random_effects import (
     tangents,
     whitening_of,
 )
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID, N_PHI, Waveforms
 from tirelib.model.base import predict, values_of
 from tirelib.model.state import Operating
-from tirelib.signal import LowPass
-from tirelib.waveforms import GRID, N_PHI, Waveforms
 
 NOISE = 1e-5
 LOADS = np.array([2500.0, 4500.0, 6500.0])

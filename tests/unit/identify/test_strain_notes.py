@@ -20,7 +20,7 @@ from tirelib.identify.strain_notes import (
     ring_expected,
     run_notes,
 )
-from tirelib.waveforms import Waveforms
+from tirelib.measured.waveforms import Waveforms
 
 
 @pytest.fixture(scope="module")

@@ -18,8 +18,8 @@ from tirelib.identify.whiten_runs import RunWhitening
 from tirelib.infer import posterior
 from tirelib.infer.normal import Normal
 from tirelib.infer.problem import Point
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import BARE, FREE, PLAIN, Coordinate, predict, values_of
-from tirelib.waveforms import GRID
 
 NOISE = 4e-5
 """Noise of one gage; with five of them near what structure leaves white in a campaign."""

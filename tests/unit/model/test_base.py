@@ -11,6 +11,8 @@ from tests.unit.identify.model_waves import TIRE, operating
 from tirelib.core.errors import ConvergenceError
 from tirelib.core.parameters import FIELDS
 from tirelib.effects import CATALOGUE
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID
 from tirelib.model import chain
 from tirelib.model.base import (
     FREE,
@@ -22,8 +24,6 @@ from tirelib.model.base import (
     values_of,
 )
 from tirelib.model.state import State
-from tirelib.signal import LowPass
-from tirelib.waveforms import GRID
 
 VALUES = values_of(TIRE)
 POINTS = operating(np.array([2500.0, 4500.0]), np.array([1.8e5, 2.4e5]))

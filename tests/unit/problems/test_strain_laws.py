@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from tests.unit.identify.model_waves import TIRE, operating
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import PLAIN, values_of
 from tirelib.model.state import State
 from tirelib.problems.strain_laws import GOES, PLACED, as_large, beside, law_errors, stiffened
-from tirelib.waveforms import GRID
 
 LOAD = np.array([2000.0, 4000.0, 6000.0])
 POINTS = operating(LOAD, np.full(3, 2.2e5))

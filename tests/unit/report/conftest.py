@@ -13,7 +13,7 @@ from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.links import Links
 from tirelib.estimators.train import Trained, train
-from tirelib.observations import Observations, observe
+from tirelib.measured.observations import Observations, observe
 
 SLIPS = (-0.3, -0.05, 0.0, 0.05, 0.3)
 

@@ -7,9 +7,9 @@ import pytest
 from pages.cutoff_study import nearest_runs, study_cut_off
 
 from tests.unit.report.conftest import World
+from tirelib.measured.signal.lowpass import DEFAULT_ORDER
 from tirelib.report.accuracy import Compared, accuracies, accuracy, compare
 from tirelib.report.levels import camber_levels, find_levels, load_levels, reference_level
-from tirelib.signal.lowpass import DEFAULT_ORDER
 
 
 def made(error: np.ndarray, std: float = 1.0, turns_per_run: int = 4) -> Compared:

@@ -22,7 +22,7 @@ from pages.live import (
 from tests.unit.report.conftest import World
 from tirelib.core.errors import CalibrationError
 from tirelib.estimators.result import estimate_document
-from tirelib.signal import LowPass
+from tirelib.measured.signal import LowPass
 
 RUNS = (2, 5)
 SCALE = 1e-6

@@ -18,6 +18,8 @@ from tests.unit.rig.hidden_cases import (
 from tirelib.core.errors import ParameterError
 from tirelib.core.parameters import Tire
 from tirelib.effects import CATALOGUE
+from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import predict, values_of
 from tirelib.model.state import Operating
 from tirelib.rig.hidden import HIDDEN, hidden
@@ -26,8 +28,6 @@ from tirelib.rig.observe import Trace, contact, edges, forces
 from tirelib.rig.solve import solve
 from tirelib.rig.tire import RigTire
 from tirelib.rig.tread import pressure
-from tirelib.signal import LowPass
-from tirelib.waveforms import GRID
 
 KNOWN = [name for name, effect in HIDDEN.items() if effect.known]
 

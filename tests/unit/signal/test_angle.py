@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from tests.synthetic import LATERAL, RATE, waveform
 from tirelib.core.flags import TurnFlag, flag_names
-from tirelib.features.extract import Features, extract_features
-from tirelib.signal import TurnCutter, cut_turns
-from tirelib.signal.angle import AngleLaw, angle_law
-from tirelib.signal.course import Course, course
+from tirelib.measured.features.extract import Features, extract_features
+from tirelib.measured.signal import TurnCutter, cut_turns
+from tirelib.measured.signal.angle import AngleLaw, angle_law
+from tirelib.measured.signal.course import Course, course
 
 RADIUS = 0.305
 SOURCES = ("omega", "speed", "none")

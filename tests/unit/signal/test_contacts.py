@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.synthetic import RATE, frames, record, synthetic_run, waveform, wrapped
-from tirelib.signal import Contact, ContactFinder
+from tirelib.measured.signal import Contact, ContactFinder
 
 
 def middles(contacts: list[Contact]) -> list[float]:

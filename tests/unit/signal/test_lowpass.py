@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirelib.core.errors import ParameterError
-from tirelib.signal.lowpass import LowPass, half_width, smooth_to_angle
+from tirelib.measured.signal.lowpass import LowPass, half_width, smooth_to_angle
 
 STEP = 2 * np.pi / 1000
 

@@ -5,9 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.signal.course import Course, course
-from tirelib.signal.slip import NOTHING, PULL_SLIP, pull, unseen_by_load, unseen_by_traction
-from tirelib.signal.turn import PHI
+from tirelib.measured.signal.course import Course, course
+from tirelib.measured.signal.slip import (
+    NOTHING,
+    PULL_SLIP,
+    pull,
+    unseen_by_load,
+    unseen_by_traction,
+)
+from tirelib.measured.signal.turn import PHI
 
 TURN, RATE = 1000.0, 1e4
 

@@ -13,8 +13,8 @@ from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.core.flags import INVALIDATING, TurnFlag
 from tirelib.fmu.virtual.spec import default_surface
 from tirelib.fmu.virtual.surface import shared_surface
-from tirelib.signal import LowPass, Turn, TurnCutter, Turns, cut_turns, stack_turns
-from tirelib.signal.quality import SPIKE_BEND, inspect
+from tirelib.measured.signal import LowPass, Turn, TurnCutter, Turns, cut_turns, stack_turns
+from tirelib.measured.signal.quality import SPIKE_BEND, inspect
 
 
 def turns_of(strain: np.ndarray, **options: object) -> Turns:

@@ -13,7 +13,7 @@ from tests.fmu import live
 from tests.synthetic import frames as cut
 from tirelib.core.flags import TurnFlag
 from tirelib.core.held import HELD
-from tirelib.signal.turns import TurnCutter
+from tirelib.measured.signal.turns import TurnCutter
 from tirelib.stream.backlog import MOST_SAMPLES, quiet_range
 from tirelib.stream.reference import NumpyEstimator
 

@@ -11,7 +11,7 @@ from tests.fmu import live
 from tests.synthetic import record
 from tirelib.core.errors import FormatError
 from tirelib.core.flags import TurnFlag
-from tirelib.signal import TurnCutter
+from tirelib.measured.signal import TurnCutter
 from tirelib.stream import StreamEstimator
 from tirelib.stream.snapshot import from_plain, restore_cutter, snapshot_cutter, to_plain
 

@@ -17,9 +17,9 @@ from tirelib.campaign import conditions_of, read_campaign
 from tirelib.core.errors import CalibrationError, ParameterError, ShapeError
 from tirelib.core.flags import TurnFlag, flag_names
 from tirelib.estimators.calibration import Estimates
-from tirelib.features import Features, extract_features
-from tirelib.observations import measure_run
-from tirelib.signal import LowPass, cut_turns
+from tirelib.measured.features import Features, extract_features
+from tirelib.measured.observations import measure_run
+from tirelib.measured.signal import LowPass, cut_turns
 from tirelib.stream import StreamEstimator, TurnEstimate
 
 QUANTITIES = ("Fz", "alpha", "kappa", "Fy")

@@ -11,6 +11,7 @@ from tirelib.compare.strain import Comparison
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.quantities import QUANTITIES
 from tirelib.identify.error_bands import levels
+from tirelib.measured.waveforms import GRID
 from tirelib.report.figures.compare_plot import (
     ANGLE_TITLE,
     Plot,
@@ -18,7 +19,6 @@ from tirelib.report.figures.compare_plot import (
     limit_of,
     styled_figure,
 )
-from tirelib.waveforms import GRID
 
 DEGREES = np.rad2deg(GRID)
 NAMES = {name: quantity.title for name, quantity in QUANTITIES.items()} | {"gage": "gage"}

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tirelib.estimators.calibration import Estimates
-from tirelib.observations import Observations
+from tirelib.measured.observations import Observations
 from tirelib.report.accuracy import (
     QUANTITIES,
     SIGNED,

@@ -7,7 +7,7 @@ from tirelib.core.errors import CalibrationError
 from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.dissertation import Regression
 from tirelib.estimators.train import Trained
-from tirelib.observations import Observations
+from tirelib.measured.observations import Observations
 from tirelib.report.accuracy import WIDTH
 from tirelib.report.figures.regression import (
     RESIDUAL,

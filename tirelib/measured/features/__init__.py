@@ -1,7 +1,7 @@
 """Features of each turn and gage: edges, peaks, integrals, symmetry."""
 
-from tirelib.features.extract import Features, extract_features
-from tirelib.features.records import RecordReader, concatenate_features, features_of_record
+from tirelib.measured.features.extract import Features, extract_features
+from tirelib.measured.features.records import RecordReader, concatenate_features, features_of_record
 
 __all__ = [
     "Features",

@@ -9,10 +9,10 @@ import numpy as np
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.compiled import loaded_core
 from tirelib.core.held import Held
-from tirelib.features.compiled import CompiledRecords
-from tirelib.features.extract import Features, extract_features
-from tirelib.signal.lowpass import LowPass
-from tirelib.signal.turns import check_gages, cut_turns
+from tirelib.measured.features.compiled import CompiledRecords
+from tirelib.measured.features.extract import Features, extract_features
+from tirelib.measured.signal.lowpass import LowPass
+from tirelib.measured.signal.turns import check_gages, cut_turns
 
 
 class RecordReader:
@@ -43,7 +43,7 @@ class RecordReader:
         start: float = 0.0,
         **held: Unpack[Held],
     ) -> tuple[FloatArray, FloatArray]:
-        """Take a record; parameters and errors are those of `tirelib.signal.cut_turns`.
+        """Take a record; parameters and errors are those of `tirelib.measured.signal.cut_turns`.
 
         Parameters
         ----------
@@ -88,7 +88,7 @@ def features_of_record(
 ) -> Features:
     """Return the features of a whole record: `extract_features` of `cut_turns`, in one go.
 
-    Parameters and errors are those of `tirelib.signal.cut_turns`.
+    Parameters and errors are those of `tirelib.measured.signal.cut_turns`.
     """
     reader = RecordReader(lateral, low_pass)
     reader.add(strain, rate, trigger=trigger, **held)

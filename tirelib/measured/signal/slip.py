@@ -21,7 +21,7 @@ what acts differently there. Two things are seen in the contact itself:
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.signal.turn import PHI
+from tirelib.measured.signal.turn import PHI
 
 RADIUS_SHARE = 0.5 / np.sqrt(3.0)
 """Root mean square of what is spread evenly from none to a half."""

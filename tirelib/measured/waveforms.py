@@ -14,8 +14,8 @@ from tirelib.campaign import Campaign, CampaignHeader, Run
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import CalibrationError
 from tirelib.core.flags import INVALIDATING
-from tirelib.signal import LowPass, Turns, cut_turns
-from tirelib.signal.lowpass import smooth_to_angle
+from tirelib.measured.signal import LowPass, Turns, cut_turns
+from tirelib.measured.signal.lowpass import smooth_to_angle
 
 N_PHI = 360
 GRID = np.linspace(-np.pi, np.pi, N_PHI, endpoint=False)

@@ -11,8 +11,8 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import CalibrationError
 from tirelib.core.flags import INVALIDATING
 from tirelib.core.sizes import differing
-from tirelib.features import Features, RecordReader
-from tirelib.signal import LowPass
+from tirelib.measured.features import Features, RecordReader
+from tirelib.measured.signal import LowPass
 
 TRUTH = ("Fx", "Fy", "Fz", "Mz", "slip_angle", "slip_ratio")
 """Rig quantities that an estimate is held against."""

@@ -17,15 +17,15 @@ from tirelib.core.compiled import (
 )
 from tirelib.core.errors import ParameterError
 from tirelib.core.held import HELD, Held
-from tirelib.signal.lowpass import LowPass
-from tirelib.signal.turn import PHI, Turns, turns_of
+from tirelib.measured.signal.lowpass import LowPass
+from tirelib.measured.signal.turn import PHI, Turns, turns_of
 
 BLOCK = 32
 """Turns that the core gives at a time."""
 
 
 class Record:
-    """A whole record in the core; parameters as in `tirelib.signal.cut_turns`.
+    """A whole record in the core; parameters as in `tirelib.measured.signal.cut_turns`.
 
     `room` is memory of ``core.cutter_size`` bytes, which is the record's as long as it is cut.
     """

@@ -5,9 +5,9 @@ from the turn that precedes the contact, so an estimate is ready twenty degrees 
 half the filter) after the trailing edge. Source: dissertation, section 3.4.
 """
 
-from tirelib.signal.contacts import Contact, ContactFinder
-from tirelib.signal.lowpass import LowPass
-from tirelib.signal.turns import Turn, TurnCutter, Turns, cut_turns, stack_turns
+from tirelib.measured.signal.contacts import Contact, ContactFinder
+from tirelib.measured.signal.lowpass import LowPass
+from tirelib.measured.signal.turns import Turn, TurnCutter, Turns, cut_turns, stack_turns
 
 __all__ = [
     "Contact",

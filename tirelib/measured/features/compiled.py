@@ -19,9 +19,9 @@ from tirelib.core.compiled import (
     reals_of,
 )
 from tirelib.core.held import Held
-from tirelib.signal.compiled import BLOCK, Record
-from tirelib.signal.lowpass import LowPass
-from tirelib.signal.turn import Turns
+from tirelib.measured.signal.compiled import BLOCK, Record
+from tirelib.measured.signal.lowpass import LowPass
+from tirelib.measured.signal.turn import Turns
 
 ROOM = 256
 """Turns for which the core has room to write at a time. It decides about memory alone: for further
@@ -90,7 +90,7 @@ class CompiledRecords:
         trigger: BoolArray | None,
         start: float,
     ) -> tuple[FloatArray, FloatArray]:
-        """Take a record, as `tirelib.features.RecordReader.add` does, at a rate that fits."""
+        """Take a record at a rate that fits; see `tirelib.measured.features.RecordReader.add`."""
         record = Record(
             self._core, self._room, strain, self._lateral, rate, low_pass, held, trigger
         )

@@ -3,11 +3,12 @@
 For the contact k, with the middles of the centre gage's pulses m at k-1 and k:
 
 - wheel angle over time from the preceding turn, ``2 pi`` from m at k-1 to m at k, and from how the
-  wheel's rate changes within it: `tirelib.signal.angle`,
+  wheel's rate changes within it: `tirelib.measured.signal.angle`,
 - offset of each gage: median over +-0.5 rad round the point half-way round from the contact,
 - conditions: mean over the preceding turn of what was held; the camber, the turn rate and the speed
   are those of the contact,
-- strain and rate over wheel angle: `tirelib.signal.lowpass`, up to 20 degrees after the pulse.
+- strain and rate over wheel angle: `tirelib.measured.signal.lowpass`, up to 20 degrees after the
+  pulse.
 
 `TurnCutter` takes samples in frames of any length; it is the readable reference. `cut_turns` cuts a
 whole record, by the compiled core where there is one; both agree to 1e-9, flags included.
@@ -25,14 +26,14 @@ from tirelib.core.compiled import loaded_core, memory
 from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.core.flags import TurnFlag
 from tirelib.core.held import HELD, Held
-from tirelib.signal.angle import SOURCES, AngleLaw, Past, angle_law, minmod
-from tirelib.signal.compiled import Record, cut_by_core
-from tirelib.signal.contacts import NEAR_EDGE, Contact, ContactFinder
-from tirelib.signal.course import course
-from tirelib.signal.lowpass import LowPass, half_width, smooth_to_angle
-from tirelib.signal.quality import UNUSABLE, inspect, without_contact
-from tirelib.signal.slip import NOTHING, Rolled, pull, unseen_by_load, unseen_by_traction
-from tirelib.signal.turn import PHI, Turn, Turns, stack_turns
+from tirelib.measured.signal.angle import SOURCES, AngleLaw, Past, angle_law, minmod
+from tirelib.measured.signal.compiled import Record, cut_by_core
+from tirelib.measured.signal.contacts import NEAR_EDGE, Contact, ContactFinder
+from tirelib.measured.signal.course import course
+from tirelib.measured.signal.lowpass import LowPass, half_width, smooth_to_angle
+from tirelib.measured.signal.quality import UNUSABLE, inspect, without_contact
+from tirelib.measured.signal.slip import NOTHING, Rolled, pull, unseen_by_load, unseen_by_traction
+from tirelib.measured.signal.turn import PHI, Turn, Turns, stack_turns
 
 __all__ = ["PHI", "Turn", "TurnCutter", "Turns", "cut_turns", "stack_turns"]
 
@@ -391,8 +392,8 @@ class TurnCutter:
 
         What is read half a turn before the contact moves on until there: the hoop strain with the
         square of the turn rate, the gage's zero with its temperature. It is followed as the turn
-        rate is, see `tirelib.signal.angle`. Each gage is compared with the last turns in which its
-        samples are not missing there.
+        rate is, see `tirelib.measured.signal.angle`. Each gage is compared with the last turns in
+        which its samples are not missing there.
         """
         time = np.where(np.isnan(opposite), np.nan, law.sample(-np.pi))
         (first, last), now = self._offsets, np.array([time, opposite])

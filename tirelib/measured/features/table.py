@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tirelib.core.flags import flag_names
-from tirelib.features.extract import Features
+from tirelib.measured.features.extract import Features
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -23,10 +23,10 @@ import numpy as np
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.compiled import GAGES, loaded_core
 from tirelib.core.flags import TurnFlag
-from tirelib.features.compiled import read_by_core
-from tirelib.features.peaks import peak
-from tirelib.signal.turn import PHI
-from tirelib.signal.turns import AFTER, Turns
+from tirelib.measured.features.compiled import read_by_core
+from tirelib.measured.features.peaks import peak
+from tirelib.measured.signal.turn import PHI
+from tirelib.measured.signal.turns import AFTER, Turns
 
 EDGE_REACH = 0.35
 """How far outside the centre gage's pulse a leading edge is looked for, [rad]."""

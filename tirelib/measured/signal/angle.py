@@ -7,7 +7,7 @@ contact is exact. How the rate runs within that turn, up to the contact and a li
           \qquad \int_{m_{k-1}}^{m_k} \omega\, dt = 2\pi
 
 - s(t), the course of a **source**: the measured turn rate where there is one, else the travel
-  speed, else one (`tirelib.signal.course`).
+  speed, else one (`tirelib.measured.signal.course`).
 - r, the **change from turn to turn** of what the source leaves: of q = mean rate / mean of s, which
   is the slip ratio's if the source is the speed, the rate's own without a source, and noise if the
   source is the turn rate. The smaller of the last two slopes of q over time is followed, and none
@@ -27,7 +27,7 @@ import numpy.typing as npt
 from numpy.polynomial.polynomial import polyval
 
 from tirelib.core.arrays import FloatArray
-from tirelib.signal.course import Course
+from tirelib.measured.signal.course import Course
 
 SOURCES = ("omega", "speed")
 """Conditions whose course within a turn gives that of the turn rate, best first."""

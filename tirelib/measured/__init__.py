@@ -1,0 +1,1 @@
+"""What was measured: strain in turns, their features, waveforms, the rig's values beside them."""
