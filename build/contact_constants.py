@@ -12,14 +12,14 @@ from unittest import mock
 
 import click
 
-from tirelib.contact import checks, exact
-from tirelib.contact import exact_energy as energy
-from tirelib.contact.tread import Tread
 from tirelib.core.errors import ConvergenceError, TirelibError
 from tirelib.core.parameters import read_tire
 from tirelib.core.threads import one_thread
+from tirelib.physics.contact import checks, exact
+from tirelib.physics.contact import exact_energy as energy
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.ring import Ring
 from tirelib.report.simulation import simulate
-from tirelib.ring.ring import Ring
 
 BICYCLE = {
     "ring_radius": 0.330,

@@ -13,27 +13,27 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from tirelib import infer
-from tirelib.brush.parabola import (
+from tirelib.core.parameters import read_tire
+from tirelib.effects import CATALOGUE
+from tirelib.infer.plain import load
+from tirelib.physics.brush.parabola import (
     aligning_moment,
     bristle_stiffness,
     lateral_force,
     sliding_angle,
 )
-from tirelib.brush.parameters import Carcass
-from tirelib.contact import radial, shear
-from tirelib.contact.profiles import convex_concave, power_law
-from tirelib.contact.static import StaticContact, StaticTire, press_to_deflection
-from tirelib.contact.tread import Tread
-from tirelib.core.parameters import read_tire
-from tirelib.effects import CATALOGUE
-from tirelib.infer.plain import load
+from tirelib.physics.brush.parameters import Carcass
+from tirelib.physics.contact import radial, shear
+from tirelib.physics.contact.profiles import convex_concave, power_law
+from tirelib.physics.contact.static import StaticContact, StaticTire, press_to_deflection
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import compliance
+from tirelib.physics.ring.frequencies import natural_frequency, three_mode_sensitivity
+from tirelib.physics.ring.green import point_response, pressed_shape
+from tirelib.physics.ring.ring import Ring
+from tirelib.physics.strain.deformation import arc_nodes, contact_deformation
+from tirelib.physics.strain.innerliner import strain_at
 from tirelib.report.style import label, legend_below, new_figure, sequence, styled
-from tirelib.ring.compliance import compliance
-from tirelib.ring.frequencies import natural_frequency, three_mode_sensitivity
-from tirelib.ring.green import point_response, pressed_shape
-from tirelib.ring.ring import Ring
-from tirelib.strain.deformation import arc_nodes, contact_deformation
-from tirelib.strain.innerliner import strain_at
 
 TIRE = read_tire("table-6-1").tire
 STANDING = StaticTire(

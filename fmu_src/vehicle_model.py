@@ -10,11 +10,11 @@ import tomllib
 import pythonfmu
 from pythonfmu import Fmi2Slave
 
-from tirelib.brush import predict
 from tirelib.core.errors import ParameterError
 from tirelib.fmu.refusals import StepError
 from tirelib.fmu.slave import GuardedSlave, Model
 from tirelib.fmu.variables import Variable
+from tirelib.physics.brush import predict
 
 
 class VehicleModel(GuardedSlave, Fmi2Slave):

@@ -9,13 +9,13 @@ from fields import State
 from section import Section
 from verify import edge, even
 
-from tirelib.contact.radial import RadialContact, load
-from tirelib.contact.static import StaticTire, press_to_load
-from tirelib.contact.tread import Tread
-from tirelib.ring.compliance import compliance
-from tirelib.ring.green import pressed_shape
-from tirelib.ring.ring import Ring
-from tirelib.strain.innerliner import strain_at
+from tirelib.physics.contact.radial import RadialContact, load
+from tirelib.physics.contact.static import StaticTire, press_to_load
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import compliance
+from tirelib.physics.ring.green import pressed_shape
+from tirelib.physics.ring.ring import Ring
+from tirelib.physics.strain.innerliner import strain_at
 
 GRID = np.linspace(0.0, 0.8, 321)
 N_MODES = 120

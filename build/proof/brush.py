@@ -17,11 +17,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from tests.magic_tires import ANGLES, LOADS, RATIOS, magic, magic_data
-from tirelib.brush.mf import magic_forces
 from tirelib.core.threads import one_thread
 from tirelib.identify.brush_estimates import estimates_of, slip_stiffness
 from tirelib.identify.brush_fit import fit_brush
 from tirelib.identify.brush_study import study_of
+from tirelib.physics.brush.mf import magic_forces
 
 FEW = (2000.0, 4000.0, 6000.0)
 FAR = np.radians([-12, -9, -6, -4, -2, -1, 0, 1, 2, 4, 6, 9, 12])

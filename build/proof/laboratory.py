@@ -10,14 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg, optimize
 
+from tirelib.physics.ring.compliance import compliance
+from tirelib.physics.ring.frequencies import sidewall_stiffness
+from tirelib.physics.ring.frequency_fit import fit_stiffness
+from tirelib.physics.ring.ring import Ring
 from tirelib.rig.belt import FIELDS, LATERAL, PSI, U, V, internal
 from tirelib.rig.solve import inflated, solve
 from tirelib.rig.tire import N_STRIPS, Array, Condition, RigTire
 from tirelib.rig.tread import pressure as tread_pressure
-from tirelib.ring.compliance import compliance
-from tirelib.ring.frequencies import sidewall_stiffness
-from tirelib.ring.frequency_fit import fit_stiffness
-from tirelib.ring.ring import Ring
 
 ORDERS = tuple(range(1, 9))
 PRESSURES = (1.7e5, 2.1e5, 2.5e5)

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.contact.static import StaticContact, StaticTire, press_to_load
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import Tire
+from tirelib.physics.contact.static import StaticContact, StaticTire, press_to_load
+from tirelib.physics.ring.green import pressed_shape
 from tirelib.report.simulation import Simulation, simulate
-from tirelib.ring.green import pressed_shape
 
 STATIC_LOADS = (1416.0, 3541.0, 5666.0, 7791.0)
 """25, 62.5, 100 and 137.5 % of 5666 N, table 3-1, [N]."""

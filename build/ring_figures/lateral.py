@@ -3,9 +3,9 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tirelib.brush.forces import brush_distribution, brush_forces
-from tirelib.brush.parameters import BrushParameters
-from tirelib.contact.profiles import PressureProfile, parabola, sampled
+from tirelib.physics.brush.forces import brush_distribution, brush_forces
+from tirelib.physics.brush.parameters import BrushParameters
+from tirelib.physics.contact.profiles import PressureProfile, parabola, sampled
 from tirelib.report.figures.ring_panels import load_labels
 from tirelib.report.simulation import Simulation
 from tirelib.report.style import (

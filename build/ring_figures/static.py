@@ -5,6 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ring_figures.cases import StaticRing
+from tirelib.physics.strain.deformation import ContactDeformation, arc_nodes, contact_deformation
 from tirelib.report.figures.ring_panels import ANGLE, PRESSURE, RADIAL, STRAIN
 from tirelib.report.simulation import MICRO
 from tirelib.report.style import (
@@ -16,7 +17,6 @@ from tirelib.report.style import (
     styled,
     zero_line,
 )
-from tirelib.strain.deformation import ContactDeformation, arc_nodes, contact_deformation
 
 NODES = 201
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.contact.free_boundary import Start
 from tirelib.core.arrays import FloatArray
 from tirelib.measured.signal import LowPass
 from tirelib.model.base import predict
 from tirelib.model.chain import Changes
 from tirelib.model.solution import solved
 from tirelib.model.state import Operating, State
+from tirelib.physics.contact.free_boundary import Start
 
 
 @dataclass(frozen=True, slots=True)

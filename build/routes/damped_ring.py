@@ -15,18 +15,18 @@ from typing import Literal
 
 import numpy as np
 
-from tirelib.contact import radial, shear
-from tirelib.contact.shear_law import Shear
-from tirelib.contact.tread import Tread
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import smoothed
 from tirelib.model.state import Operating, State
-from tirelib.ring.compliance import Compliance, compliance
-from tirelib.ring.ring import ComplexArray, Ring, columns, modal_stiffness
-from tirelib.strain.innerliner import strain_at
+from tirelib.physics.contact import radial, shear
+from tirelib.physics.contact.shear_law import Shear
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import Compliance, compliance
+from tirelib.physics.ring.ring import ComplexArray, Ring, columns, modal_stiffness
+from tirelib.physics.strain.innerliner import strain_at
 
 N_MODES = 60
 SHEAR_SHARE = 1.0 / 3.0

@@ -12,13 +12,13 @@ from typing import Literal
 import numpy as np
 
 from routes.damped_ring import SHEAR_SHARE, Law, damped_compliance
-from tirelib.contact import radial, shear
-from tirelib.contact.shear_law import Shear
-from tirelib.contact.tread import Tread
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
-from tirelib.ring.compliance import Compliance
-from tirelib.ring.ring import Ring
+from tirelib.physics.contact import radial, shear
+from tirelib.physics.contact.shear_law import Shear
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import Compliance
+from tirelib.physics.ring.ring import Ring
 
 SETTLE = 4
 """Passes that let k_u follow the deflection, Eq. (54)."""

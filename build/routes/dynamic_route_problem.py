@@ -10,7 +10,6 @@ from routes.correction import Correction, large_displacements
 from routes.dynamic_route_validation import predicted_deflection
 from routes.edges import STRUCTURE, Edges, corrected, edge_bias, model_edges, read_edges
 from routes.static_route_fit import FewFit, Parameter, Quantity, fit_few
-from tirelib.contact import radial
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import CalibrationError, ConvergenceError, ParameterError
 from tirelib.core.parameters import TireFile
@@ -18,7 +17,8 @@ from tirelib.identify.campaign_data import StraightRuns
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import operating_points, values_of
 from tirelib.model.state import State
-from tirelib.ring.compliance import compliance
+from tirelib.physics.contact import radial
+from tirelib.physics.ring.compliance import compliance
 
 N_MODES = 60
 OUTER = 2

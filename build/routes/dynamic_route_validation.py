@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.contact import radial
-from tirelib.contact.exact import load_exact
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.measured.waveforms import GRID
 from tirelib.model.state import Operating, State
-from tirelib.ring.compliance import compliance
-from tirelib.ring.frequencies import rim_stiffness
+from tirelib.physics.contact import radial
+from tirelib.physics.contact.exact import load_exact
+from tirelib.physics.ring.compliance import compliance
+from tirelib.physics.ring.frequencies import rim_stiffness
 
 N_MODES = 60
 SAME_SERIES = 0.06

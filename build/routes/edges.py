@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from routes.correction import Correction, predict_with
-from tirelib.contact.exact import load_exact
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import CalibrationError, ShapeError
 from tirelib.measured.features.peaks import peak
@@ -26,6 +25,7 @@ from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import predict, smoothed
 from tirelib.model.state import Operating
+from tirelib.physics.contact.exact import load_exact
 
 FINER = 4
 """Grid refinement (by Fourier series, exact for the filtered strain) before peaks are read."""

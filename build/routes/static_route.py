@@ -29,12 +29,12 @@ from routes.dynamic_route_validation import SAME_SERIES
 from routes.edges import Edges, corrected, edge_bias, read_edges
 from routes.static_route_fit import FewFit, Quantity
 from routes.static_route_problem import Conventional, StrainProblem
-from tirelib.contact.static import StaticContact
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import CalibrationError, ConvergenceError, ParameterError
 from tirelib.core.parameters import TireFile
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.model.base import operating_points, values_of
+from tirelib.physics.contact.static import StaticContact
 
 LEAST_LOADS = 3
 

@@ -3,16 +3,16 @@
 import numpy as np
 
 from routes.static_route_fit import FewFit, Parameter, Quantity, fit_few, profile
-from tirelib.contact.profiles import convex_concave
-from tirelib.contact.static import StaticContact, StaticTire, press_to_deflection
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.core.parameters import TireFile
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
-from tirelib.ring.green import modal_response
-from tirelib.strain.deformation import (
+from tirelib.physics.contact.profiles import convex_concave
+from tirelib.physics.contact.static import StaticContact, StaticTire, press_to_deflection
+from tirelib.physics.ring.green import modal_response
+from tirelib.physics.strain.deformation import (
     arc_nodes,
     contact_deformation,
     series_strain,

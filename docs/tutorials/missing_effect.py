@@ -28,8 +28,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import tirelib
-from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
 from tirelib.campaign import CampaignHeader, Run, RunPlan, TireGeometry, Tolerance, write_campaign
+from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
 
 folder = Path(tempfile.mkdtemp())
 random = np.random.default_rng(7)

@@ -36,7 +36,7 @@ from example_rig import measure
 from scipy.io import savemat
 
 import tirelib
-from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
+from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
 
 folder = Path(tempfile.mkdtemp())
 random = np.random.default_rng(7)

@@ -13,7 +13,6 @@ import pytest
 from tests.chain.test_command_line import run
 from tests.synthetic import LATERAL, RATE, header
 from tests.unit.compare.compare_synthetic import bump, model_file, plan, points_of
-from tirelib.brush.predict import PointConditions, predict_forces
 from tirelib.campaign import Run, RunPlan, write_campaign
 from tirelib.core.parameters import Number, TireFile, write_tire
 from tirelib.identify.brush_model import brush_of
@@ -22,6 +21,7 @@ from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import values_of
 from tirelib.model.solution import solved
+from tirelib.physics.brush.predict import PointConditions, predict_forces
 
 NO_FILTER = LowPass(order=120.0)
 

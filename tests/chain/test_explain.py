@@ -13,10 +13,10 @@ from click.testing import CliRunner, Result
 from tests.chain.test_diagnose import Folder
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
 from tests.unit.force_campaigns import brush_file, steady_runs, write_forces
-from tirelib import waveforms
 from tirelib.cli import program
 from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import read_tire, write_tire
+from tirelib.measured import waveforms
 
 KEYS = {
     "format",

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
 from tirelib.campaign import (
     CampaignHeader,
     Run,
@@ -24,6 +23,7 @@ from tirelib.core.parameters import read_tire, write_tire
 from tirelib.identify.brush_model import brush_of
 from tirelib.identify.force_data import force_data
 from tirelib.identify.ring_patch import half_lengths
+from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
 
 TIRE = read_tire("table-6-1").tire
 C_PY, MU = 9e6, 0.92

@@ -15,11 +15,11 @@ from click.testing import CliRunner, Result
 
 from tests.chain.test_diagnose import Folder
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
-from tirelib import waveforms
 from tirelib.cli import program
 from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import write_tire
 from tirelib.effects import CATALOGUE
+from tirelib.measured import waveforms
 from tirelib.measured.waveforms import Waveforms
 
 

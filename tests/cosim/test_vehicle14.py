@@ -26,9 +26,9 @@ from cosim.vehicle14.tire import BrushTires, tires_of
 from scipy.integrate import simpson
 from scipy.optimize import root
 
-from tirelib.brush import predict
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
+from tirelib.physics.brush import predict
 
 LEFT_RIGHT = np.array([1, 0, 3, 2])
 TURNING = replace(

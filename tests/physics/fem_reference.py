@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.contact import shear
-from tirelib.contact.exact import load_exact
-from tirelib.contact.radial import load
-from tirelib.contact.tread import Tread
-from tirelib.ring.compliance import compliance
-from tirelib.ring.ring import Ring
-from tirelib.strain.innerliner import strain_at
+from tirelib.physics.contact import shear
+from tirelib.physics.contact.exact import load_exact
+from tirelib.physics.contact.radial import load
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import compliance
+from tirelib.physics.ring.ring import Ring
+from tirelib.physics.strain.innerliner import strain_at
 
 Floats = npt.NDArray[np.float64]
 

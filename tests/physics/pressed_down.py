@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from tirelib.contact.shear_law import Elements, Rolling, Shear, elements
-from tirelib.contact.tread import Tread
-from tirelib.ring.compliance import Compliance
+from tirelib.physics.contact.shear_law import Elements, Rolling, Shear, elements
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import Compliance
 
 Floats = npt.NDArray[np.float64]
 

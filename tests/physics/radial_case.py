@@ -6,11 +6,11 @@ import numpy as np
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from tirelib.contact.radial import RadialContact, press
-from tirelib.contact.tread import Tread
 from tirelib.core.parameters import Tire, read_tire
-from tirelib.ring.compliance import Compliance, compliance
-from tirelib.ring.ring import Ring, plain_stiffness
+from tirelib.physics.contact.radial import RadialContact, press
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import Compliance, compliance
+from tirelib.physics.ring.ring import Ring, plain_stiffness
 
 TIRE = read_tire("table-6-1").tire
 TREAD = Tread.of(TIRE)

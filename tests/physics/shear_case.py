@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tirelib.contact import shear
-from tirelib.contact.shear import Shear, ShearContact
-from tirelib.contact.tread import Tread
-from tirelib.ring.compliance import Compliance, compliance
-from tirelib.ring.ring import Ring
+from tirelib.physics.contact import shear
+from tirelib.physics.contact.shear import Shear, ShearContact
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import Compliance, compliance
+from tirelib.physics.ring.ring import Ring
 
 Array = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ from tests.physics.fem_reference import (
     tensioned,
     within,
 )
-from tirelib.contact.static import StaticTire, press_to_load
-from tirelib.ring.green import pressed_shape
+from tirelib.physics.contact.static import StaticTire, press_to_load
+from tirelib.physics.ring.green import pressed_shape
 
 INFLATED = ("solid_mu050", "solid_mu000", "solid_mu100", "blocks_mu050", "blocks_mu000")
 INFLATED += ("stretchy_mu050", "stretchy_mu000")

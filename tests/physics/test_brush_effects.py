@@ -10,12 +10,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
-from tirelib.brush.shaped import predict_shaped
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE, Effect, effect
 from tirelib.effects.load import all_effects
 from tirelib.model.brush import BrushConditions, BrushState, brush_forces, brush_state
+from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
+from tirelib.physics.brush.shaped import predict_shaped
 
 NAMES = [
     "ring_pressure",

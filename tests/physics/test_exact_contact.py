@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from tirelib.contact import exact, radial
-from tirelib.contact import exact_energy as energy
-from tirelib.contact.exact import load_exact
-from tirelib.contact.tread import Tread
 from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.core.parameters import read_tire
-from tirelib.ring.compliance import compliance
-from tirelib.ring.ring import Ring
+from tirelib.physics.contact import exact, radial
+from tirelib.physics.contact import exact_energy as energy
+from tirelib.physics.contact.exact import load_exact
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import compliance
+from tirelib.physics.ring.ring import Ring
 
 RING = Ring(
     radius=0.302,

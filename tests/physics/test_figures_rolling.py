@@ -21,8 +21,8 @@ from tests.physics.figure_cases import (
     speeds,
     tire,
 )
-from tirelib.brush.forces import brush_forces
-from tirelib.brush.parameters import BrushParameters
+from tirelib.physics.brush.forces import brush_forces
+from tirelib.physics.brush.parameters import BrushParameters
 from tirelib.report.simulation import Simulation
 
 # Section 6.5.2.2: damping and speed

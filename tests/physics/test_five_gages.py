@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tirelib.campaign import read_campaign
-from tirelib.contact.strips import RoadForces, StripContact, press_strips
 from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.core.parameters import Tire
 from tirelib.core.traces import StrainTrace
@@ -17,12 +16,13 @@ from tirelib.measured.observations import measure_run
 from tirelib.measured.signal import LowPass
 from tirelib.measured.signal.lowpass import smooth_to_angle
 from tirelib.measured.signal.turns import Turns
+from tirelib.physics.contact.strips import RoadForces, StripContact, press_strips
+from tirelib.physics.strain.gages import gage_harmonics, gage_trace
+from tirelib.physics.strain.innerliner import strain_harmonics
 from tirelib.rig.observe import forces
 from tirelib.rig.observe import trace as rig_trace
 from tirelib.rig.solve import State, solve
 from tirelib.rig.tire import Condition, RigTire
-from tirelib.strain.gages import gage_harmonics, gage_trace
-from tirelib.strain.innerliner import strain_harmonics
 
 TIRE = Tire(
     ring_radius=0.3035,

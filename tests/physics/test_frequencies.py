@@ -8,7 +8,7 @@ from scipy.linalg import circulant, eigh
 from scipy.stats import binom
 
 from tirelib.core.errors import ParameterError, ShapeError
-from tirelib.ring.frequencies import (
+from tirelib.physics.ring.frequencies import (
     belt_mass,
     natural_frequency,
     rim_stiffness,
@@ -17,7 +17,7 @@ from tirelib.ring.frequencies import (
     three_mode_sensitivity,
     tread_stiffness,
 )
-from tirelib.ring.frequency_fit import fit_stiffness
+from tirelib.physics.ring.frequency_fit import fit_stiffness
 
 R, WIDTH, MASS, PRESSURE = 0.3, 0.165, 3.16, 1.32e5
 RING = {

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirelib.core.errors import ParameterError, ShapeError
-from tirelib.ring.green import (
+from tirelib.physics.ring.green import (
     modal_response,
     point_response,
     point_response_series,

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.contact.fourier import evaluate
 from tirelib.core.errors import ParameterError
-from tirelib.ring.lateral import BeamConstants, LateralBelt, LateralDeflection, bend_belt
-from tirelib.ring.lateral import infinite_beam as infinite
+from tirelib.physics.contact.fourier import evaluate
+from tirelib.physics.ring.lateral import BeamConstants, LateralBelt, LateralDeflection, bend_belt
+from tirelib.physics.ring.lateral import infinite_beam as infinite
 
 R = 0.3
 BELT: dict[str, Any] = {

@@ -6,10 +6,10 @@ from hypothesis import given
 from scipy.optimize import fsolve
 
 from tests.physics.radial_case import TIRE, TREAD, contacts, on_a_grid, printed_response, ring
-from tirelib.contact.fourier import evaluate
-from tirelib.contact.free_boundary import Start
-from tirelib.contact.radial import RadialContact, fit_edges, load, press
 from tirelib.core.parameters import Tire
+from tirelib.physics.contact.fourier import evaluate
+from tirelib.physics.contact.free_boundary import Start
+from tirelib.physics.contact.radial import RadialContact, fit_edges, load, press
 
 ANCHORS = [  # d0 [mm], Omega, lambda, lead, trail [rad], Fz [N], q centre, q max [N/m], centre [mm]
     (25, 0, 0.0, 0.2380, 0.2380, 5127.5, 40777, 41331, 0.00),

@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.physics.radial_case import TIRE, TREAD, on_a_grid, ring
-from tirelib.contact.checks import LARGEST_ANGLE, carried
-from tirelib.contact.radial import RadialContact, fit_edges, load, press
-from tirelib.contact.tread import Tread
 from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.core.parameters import read_tire
+from tirelib.physics.contact.checks import LARGEST_ANGLE, carried
+from tirelib.physics.contact.radial import RadialContact, fit_edges, load, press
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import Compliance, compliance
+from tirelib.physics.ring.ring import Ring
 from tirelib.report.simulation import simulate
-from tirelib.ring.compliance import Compliance, compliance
-from tirelib.ring.ring import Ring
 
 
 def test_a_belt_that_stretches_gives_way_as_a_whole_too() -> None:

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse.linalg import spsolve
 
-from tirelib.contact.fourier import evaluate, load_harmonics
 from tirelib.core.parameters import read_tire
-from tirelib.ring.compliance import compliance
-from tirelib.ring.ring import Ring, plain_stiffness
+from tirelib.physics.contact.fourier import evaluate, load_harmonics
+from tirelib.physics.ring.compliance import compliance
+from tirelib.physics.ring.ring import Ring, plain_stiffness
 
 TIRE = read_tire("table-6-1").tire
 RING = replace(Ring.of(TIRE, TIRE.pressure), damping=0.0)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from tirelib.core.errors import ParameterError
 from tirelib.core.parameters import read_tire
-from tirelib.ring.compliance import Compliance, compliance
-from tirelib.ring.ring import Ring, dashpots, modal_stiffness
+from tirelib.physics.ring.compliance import Compliance, compliance
+from tirelib.physics.ring.ring import Ring, dashpots, modal_stiffness
 
 TIRE = read_tire("table-6-1").tire
 RING = replace(Ring.of(TIRE, TIRE.pressure), damping=0.0)

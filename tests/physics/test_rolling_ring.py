@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tirelib.contact.exact import load_exact
-from tirelib.contact.tread import Tread
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError, ParameterError
-from tirelib.ring.ring import Ring
+from tirelib.physics.contact.exact import load_exact
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.ring import Ring
 from tirelib.rolling import belt, road
 from tirelib.rolling.assemble import Unknowns, changed, matrix, residual
 from tirelib.rolling.constants import Constants

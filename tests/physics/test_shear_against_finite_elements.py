@@ -24,9 +24,9 @@ from tests.physics.fem_reference import (
     within,
 )
 from tests.physics.pressed_down import PressedDown
-from tirelib.contact import exact_energy as energy
-from tirelib.contact.shear_law import Shear
-from tirelib.ring.compliance import compliance
+from tirelib.physics.contact import exact_energy as energy
+from tirelib.physics.contact.shear_law import Shear
+from tirelib.physics.ring.compliance import compliance
 
 FRICTION = 0.5
 RUBBING = tuple(f"{tire}_mu050" for tire in PAIRS)

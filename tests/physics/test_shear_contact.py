@@ -18,14 +18,14 @@ from tests.physics.shear_case import (
     contact,
     ring,
 )
-from tirelib.contact import radial, shear
-from tirelib.contact.free_boundary import Constant
-from tirelib.contact.shear import Shear, ShearContact
-from tirelib.contact.shear_law import Rolling, elements, kinematics
-from tirelib.contact.shear_newton import start
-from tirelib.contact.shear_system import Mesh, Patch, ShearProblem, assemble
-from tirelib.contact.tread import Tread
-from tirelib.ring.ring import modal_damping_time
+from tirelib.physics.contact import radial, shear
+from tirelib.physics.contact.free_boundary import Constant
+from tirelib.physics.contact.shear import Shear, ShearContact
+from tirelib.physics.contact.shear_law import Rolling, elements, kinematics
+from tirelib.physics.contact.shear_newton import start
+from tirelib.physics.contact.shear_system import Mesh, Patch, ShearProblem, assemble
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.ring import modal_damping_time
 
 
 def states(n: int = 200) -> tuple[Array, Array, Rolling]:

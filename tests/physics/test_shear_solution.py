@@ -19,12 +19,12 @@ from tests.physics.shear_case import (
     contact,
     ring,
 )
-from tirelib.contact import radial, shear
-from tirelib.contact.shear import Shear, ShearContact
-from tirelib.contact.shear_law import Elements
-from tirelib.contact.tread import Tread
 from tirelib.core.errors import ConvergenceError, ParameterError
-from tirelib.ring.compliance import Compliance, compliance
+from tirelib.physics.contact import radial, shear
+from tirelib.physics.contact.shear import Shear, ShearContact
+from tirelib.physics.contact.shear_law import Elements
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import Compliance, compliance
 
 # friction
 

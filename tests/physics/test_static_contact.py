@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq, nnls
 
-from tirelib.contact.static import (
+from tirelib.core.errors import ConvergenceError, ParameterError
+from tirelib.physics.contact.static import (
     StaticTire,
     press_to_deflection,
     press_to_load,
     road_gap,
 )
-from tirelib.core.errors import ConvergenceError, ParameterError
-from tirelib.ring.green import point_response_series, pressed_shape
+from tirelib.physics.ring.green import point_response_series, pressed_shape
 
 TIRE = StaticTire(
     ring_radius=0.3,

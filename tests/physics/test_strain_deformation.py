@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.contact.static import StaticTire, press_to_deflection, road_gap
 from tirelib.core.errors import ParameterError, ShapeError
-from tirelib.ring.green import pressed_shape
-from tirelib.strain.deformation import (
+from tirelib.physics.contact.static import StaticTire, press_to_deflection, road_gap
+from tirelib.physics.ring.green import pressed_shape
+from tirelib.physics.strain.deformation import (
     arc_condition,
     arc_nodes,
     contact_deformation,
@@ -16,8 +16,8 @@ from tirelib.strain.deformation import (
     series_strain,
     symmetric_series,
 )
-from tirelib.strain.full_turn import full_ring_deformation, undetermined_part
-from tirelib.strain.relations import (
+from tirelib.physics.strain.full_turn import full_ring_deformation, undetermined_part
+from tirelib.physics.strain.relations import (
     BeltShape,
     bending_strain,
     full_strain,

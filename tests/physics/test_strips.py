@@ -6,18 +6,18 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tirelib.contact.fourier import evaluate
-from tirelib.contact.load_transfer import roll_load, strip_deflection
-from tirelib.contact.radial import load
-from tirelib.contact.strips import SHARED, Layout, RoadForces, StripContact, press_strips
-from tirelib.contact.tread import Tread
 from tirelib.core.errors import ParameterError
 from tirelib.core.parameters import Tire
+from tirelib.physics.contact.fourier import evaluate
+from tirelib.physics.contact.load_transfer import roll_load, strip_deflection
+from tirelib.physics.contact.radial import load
+from tirelib.physics.contact.strips import SHARED, Layout, RoadForces, StripContact, press_strips
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import compliance
+from tirelib.physics.ring.ring import Ring
 from tirelib.rig.observe import edges, forces
 from tirelib.rig.solve import State, solve
 from tirelib.rig.tire import Condition, RigTire
-from tirelib.ring.compliance import compliance
-from tirelib.ring.ring import Ring
 
 # the rig's own constants where it has them, none fitted
 TIRE = Tire(

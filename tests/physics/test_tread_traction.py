@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from tirelib.contact.fourier import evaluate
-from tirelib.contact.strips import Layout, StripContact, press_strips
 from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.core.parameters import Tire
-from tirelib.strain.gages import gage_trace
-from tirelib.strain.tread_traction import TreadBeam, outward_shear, tread_strain
+from tirelib.physics.contact.fourier import evaluate
+from tirelib.physics.contact.strips import Layout, StripContact, press_strips
+from tirelib.physics.strain.gages import gage_trace
+from tirelib.physics.strain.tread_traction import TreadBeam, outward_shear, tread_strain
 
 TIRE = Tire(
     ring_radius=0.3035,

@@ -27,11 +27,11 @@ from tirelib.identify.campaign_data import straight_runs
 from tirelib.identify.identify import start_file
 from tirelib.measured.waveforms import measure_waveforms
 from tirelib.model.base import operating_points, values_of
+from tirelib.physics.ring.compliance import compliance
+from tirelib.physics.ring.ring import Ring
 from tirelib.rig.campaign import run_plan
 from tirelib.rig.plans import Plan
 from tirelib.rig.tire import Condition, RigTire
-from tirelib.ring.compliance import compliance
-from tirelib.ring.ring import Ring
 
 TRUE = tire()
 WRONG = tire(

@@ -10,15 +10,15 @@ from routes.static_route_fit import Parameter, Quantity, fit_few, profile
 from routes.static_route_problem import StrainProblem
 
 from tests.routes.route_campaign import SERIES, runs, tire, tire_file
-from tirelib.contact.static import StaticTire, press_to_load
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
 from tirelib.identify.campaign_data import StraightRuns
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import operating_points, smoothed
-from tirelib.ring.green import modal_response, pressed_shape
-from tirelib.strain.full_turn import full_ring_deformation
+from tirelib.physics.contact.static import StaticTire, press_to_load
+from tirelib.physics.ring.green import modal_response, pressed_shape
+from tirelib.physics.strain.full_turn import full_ring_deformation
 
 EI, K_U, RATE, K_T = 12.0, 1.1e6, -4.0, 7.5e7
 TRUE = tire()

@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from tirelib.contact import shear
-from tirelib.contact.radial import load, press
-from tirelib.contact.tread import Tread
 from tirelib.core.parameters import Tire, read_tire
-from tirelib.ring.compliance import Compliance, compliance
-from tirelib.ring.ring import Ring, plain_stiffness
+from tirelib.physics.contact import shear
+from tirelib.physics.contact.radial import load, press
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import Compliance, compliance
+from tirelib.physics.ring.ring import Ring, plain_stiffness
 
 pytestmark = pytest.mark.speed
 TIRE = read_tire("table-6-1").tire

@@ -12,8 +12,8 @@ from tirelib.core.errors import CalibrationError
 from tirelib.core.units import to_si
 
 if TYPE_CHECKING:
-    from tirelib.brush.mf_fit import MagicFit
     from tirelib.core.parameters import TireFile
+    from tirelib.physics.brush.mf_fit import MagicFit
 
 FORMAT = "tirelib-export/1"
 
@@ -79,14 +79,14 @@ def export(
     json_file: Path | None,
 ) -> None:
     """Fit a Magic Formula 6.1 to a model's brush or to a force campaign, and write it as .tir."""
-    from tirelib.brush.mf_file import tir_of, words
-    from tirelib.brush.mf_fit import fit_magic
-    from tirelib.brush.tir import write_tir
     from tirelib.campaign import read_campaign
     from tirelib.compare.force_model import force_model_of
     from tirelib.compare.magic_points import campaign_points, model_points
     from tirelib.core.parameters import read_tire
     from tirelib.model.registration import registered_effects
+    from tirelib.physics.brush.mf_file import tir_of, words
+    from tirelib.physics.brush.mf_fit import fit_magic
+    from tirelib.physics.brush.tir import write_tir
 
     given = None if radius is None else to_si(radius, "mm", "length")
     if Path(source).is_dir():

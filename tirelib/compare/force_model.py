@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.brush.predict import PointForces
 from tirelib.campaign import Campaign
 from tirelib.compare.model import UsedEffect, effects_of
 from tirelib.core.errors import CalibrationError, FormatError, ParameterError
@@ -17,6 +16,7 @@ from tirelib.identify.force_bench import Changes, ForceBench
 from tirelib.identify.force_checks import ANGLE_SPAN, RATIO_SPAN
 from tirelib.identify.force_data import FORCES, ForceData
 from tirelib.identify.force_points import ForcePoints
+from tirelib.physics.brush.predict import PointForces
 
 REFERENCE_LOAD, REFERENCE_PRESSURE = 4000.0, 2.0e5
 """Where laws of load and pressure change nothing, if the model does not say it, [N] and [Pa]."""

@@ -5,14 +5,14 @@ from itertools import product
 
 import numpy as np
 
-from tirelib.brush.mf_fit import MagicPoints
-from tirelib.brush.predict import PointForces
 from tirelib.campaign import Campaign
 from tirelib.compare.force_model import ForceModel
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.identify.force_data import ForceData, force_data
 from tirelib.identify.force_points import ForcePoints, force_points
+from tirelib.physics.brush.mf_fit import MagicPoints
+from tirelib.physics.brush.predict import PointForces
 
 LOADS = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75)
 """Loads, over the reference load of the brush. Half and double as many leave the error of Fy at

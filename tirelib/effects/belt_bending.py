@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tirelib.contact.fourier import load_harmonics
 from tirelib.effects.effect import State, effect
-from tirelib.ring.lateral import LateralBelt, bend_belt
+from tirelib.physics.contact.fourier import load_harmonics
+from tirelib.physics.ring.lateral import LateralBelt, bend_belt
 
 BENDING = 1500.0
 """EI_z of the belt in its own plane, [N m^2]."""

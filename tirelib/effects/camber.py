@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tirelib.contact.radial import press
 from tirelib.effects.effect import State, effect
+from tirelib.physics.contact.radial import press
 
 
 @effect(
@@ -14,7 +14,7 @@ from tirelib.effects.effect import State, effect
     high=1.5,
     varies_with=("camber", "lateral"),
     needs=("camber",),
-    source="dissertation, Fig. 4-16; geometry of tirelib.contact.load_transfer",
+    source="dissertation, Fig. 4-16; geometry of tirelib.physics.contact.load_transfer",
 )
 def camber(state: State, strength: float) -> State:
     """Camber presses one side of the tread deeper than the other.

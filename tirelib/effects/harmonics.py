@@ -4,7 +4,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.effects.effect import State
-from tirelib.ring.ring import ComplexArray
+from tirelib.physics.ring.ring import ComplexArray
 
 
 def orders(state: State) -> IntArray:

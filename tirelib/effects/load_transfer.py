@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tirelib.contact.radial import press
 from tirelib.effects.effect import State, effect
+from tirelib.physics.contact.radial import press
 
 DEG_PER_KN = np.deg2rad(1.0) / 1e3
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from tirelib.contact.fourier import load_harmonics
-from tirelib.contact.radial import RadialContact, load
 from tirelib.core.arrays import FloatArray
 from tirelib.effects.effect import State
-from tirelib.ring.ring import ComplexArray
+from tirelib.physics.contact.fourier import load_harmonics
+from tirelib.physics.contact.radial import RadialContact, load
+from tirelib.physics.ring.ring import ComplexArray
 
 
 def along(contact: RadialContact) -> FloatArray:
@@ -27,7 +27,8 @@ def balanced(contact: RadialContact, traction: FloatArray) -> FloatArray:
 def beam_strain(state: State, traction: FloatArray) -> ComplexArray:
     r"""Return harmonics of the innerliner's strain that traction on the flat piece adds.
 
-    The straight beam of `tirelib.strain.tread_traction` without restraint: N_n = -R tau_n / (i n),
+    The straight beam of `tirelib.physics.strain.tread_traction` without restraint: N_n = -R tau_n /
+    (i n),
 
     .. math:: \varepsilon_n = N_n\left(\frac1{EA} + \frac{y\,(R_0 - R)}{EI}\right).
 

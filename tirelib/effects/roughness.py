@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tirelib.contact.fourier import evaluate
 from tirelib.effects.effect import State, effect
 from tirelib.effects.patch import inward, pressed_again
+from tirelib.physics.contact.fourier import evaluate
 
 
 @effect(

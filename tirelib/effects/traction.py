@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tirelib.contact.fourier import load_harmonics
 from tirelib.effects.effect import State, effect
 from tirelib.effects.patch import pressed_again
+from tirelib.physics.contact.fourier import load_harmonics
 
 
 @effect(

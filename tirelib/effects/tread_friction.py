@@ -6,7 +6,7 @@ import numpy as np
 
 from tirelib.effects.effect import State, effect
 from tirelib.effects.patch import along, balanced, beam_strain, held_shear, sheared
-from tirelib.strain.innerliner import strain_harmonics
+from tirelib.physics.strain.innerliner import strain_harmonics
 
 BUILT_UP = 1.0 / 3.0
 """Share of half a contact over which friction builds up, from the middle."""

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.brush.predict import PointParameters
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.identify.brush_law import point_parameters
 from tirelib.identify.brush_problem import BrushProblem
 from tirelib.identify.error_bands import levels
 from tirelib.identify.force_data import ForceData
+from tirelib.physics.brush.predict import PointParameters
 
 FEW = 150
 """Up to so many points each is its own cell."""

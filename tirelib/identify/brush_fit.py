@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.brush.predict import PointForces, PointParameters
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import Tire
@@ -25,6 +24,7 @@ from tirelib.identify.error_bands import BandError, band_errors
 from tirelib.identify.force_checks import refuse_wrong_forces, slips_vary
 from tirelib.identify.force_data import FORCES, ForceData
 from tirelib.identify.ring_patch import ring_half
+from tirelib.physics.brush.predict import PointForces, PointParameters
 
 LOAD_RATIO = 1.1
 """Least ratio of loads that tells anything of the law."""

@@ -12,10 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tirelib.brush.predict import PointConditions, PointForces, PointParameters, predict_forces
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.identify.force_data import ForceData
+from tirelib.physics.brush.predict import (
+    PointConditions,
+    PointForces,
+    PointParameters,
+    predict_forces,
+)
 
 
 class Spec(NamedTuple):
@@ -49,7 +54,7 @@ SPECS: Mapping[str, Spec] = MappingProxyType(
         "lateral_compliance": Spec("m/N", 0.0, 5e-5, 1e-5),
     }
 )
-"""Every number of the law; meanings in `tirelib.brush.predict.PointParameters`.
+"""Every number of the law; meanings in `tirelib.physics.brush.predict.PointParameters`.
 
 half_length is a0 at the reference load and pressure; load_power is n, pressure_power is m.
 """

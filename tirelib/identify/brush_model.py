@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.brush.predict import PointForces, PointParameters
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
 from tirelib.core.parameters import Number, Tire, TireFile
 from tirelib.identify.brush_law import SPECS, Reference, point_parameters, predict
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.ring_patch import ring_half
+from tirelib.physics.brush.predict import PointForces, PointParameters
 
 STORED: Mapping[str, str] = MappingProxyType(
     {

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from tirelib.brush.predict import PointForces
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.identify.brush_law import SPECS, Reference, predict
 from tirelib.identify.force_data import ForceData
+from tirelib.physics.brush.predict import PointForces
 
 ASSUMED_HALF_LENGTH = 0.06
 """Where nothing tells it, [m]; c_py is then not identifiable, c_py a^2 is."""

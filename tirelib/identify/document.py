@@ -11,7 +11,7 @@ from tirelib.core.parameters import FIELDS, TireFile
 from tirelib.core.units import from_si
 from tirelib.identify.estimate import Estimate
 from tirelib.identify.identify import WITHOUT_EFFECTS, Identification
-from tirelib.ring.frequencies import rim_stiffness
+from tirelib.physics.ring.frequencies import rim_stiffness
 
 FORMAT = "tirelib-identification/1"
 

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.brush.predict import PointForces
-from tirelib.brush.shaped import HIGHEST
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import CalibrationError
 from tirelib.core.parameters import Tire
@@ -15,6 +13,8 @@ from tirelib.identify.brush_model import BrushModel
 from tirelib.identify.force_points import ForcePoints
 from tirelib.identify.ring_patch import half_lengths, ring_contact
 from tirelib.model.brush import BrushChange, BrushConditions, BrushState, brush_forces, brush_state
+from tirelib.physics.brush.predict import PointForces
+from tirelib.physics.brush.shaped import HIGHEST
 
 Changes = Sequence[tuple[str, BrushChange]]
 _GRID = (6, 3)

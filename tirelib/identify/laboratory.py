@@ -13,7 +13,7 @@ import numpy as np
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import Tire
 from tirelib.model.base import Coordinate
-from tirelib.ring.frequencies import natural_frequency, rim_stiffness
+from tirelib.physics.ring.frequencies import natural_frequency, rim_stiffness
 
 SIDEWALL, MODAL, MASS, TREAD, GROWTH, SECTION = 0.03, 0.01, 0.03, 0.05, 0.05, 0.01
 """Relative accuracy (one standard deviation) of the tests; MASS is what a modal test takes."""

@@ -20,9 +20,6 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import least_squares
 
-from tirelib.brush.forces import brush_forces
-from tirelib.brush.parameters import BrushParameters
-from tirelib.contact.profiles import PressureProfile
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import Tire
@@ -30,6 +27,9 @@ from tirelib.identify.brush_fit import fit_brush
 from tirelib.identify.error_bands import bands, levels
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.ring_patch import profiles
+from tirelib.physics.brush.forces import brush_forces
+from tirelib.physics.brush.parameters import BrushParameters
+from tirelib.physics.contact.profiles import PressureProfile
 
 MOST_POINTS = 2000
 """Profiles are solved and integrated point by point: take run means, or thin a sweep."""

@@ -3,15 +3,15 @@
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
-from tirelib.contact.profiles import PressureProfile, parabola, sampled
-from tirelib.contact.radial import RadialContact, load
-from tirelib.contact.tread import Tread
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.core.parameters import Tire
 from tirelib.identify.force_data import ForceData
-from tirelib.ring.compliance import Compliance, compliance
-from tirelib.ring.ring import Ring
+from tirelib.physics.contact.profiles import PressureProfile, parabola, sampled
+from tirelib.physics.contact.radial import RadialContact, load
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import Compliance, compliance
+from tirelib.physics.ring.ring import Ring
 
 N_MODES = 60
 SAMPLES = 121

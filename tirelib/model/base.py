@@ -5,13 +5,13 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tirelib.contact.free_boundary import Start
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import FIELDS, Tire
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID, Waveforms
 from tirelib.model.chain import Changes, waveform
 from tirelib.model.state import Operating, State
+from tirelib.physics.contact.free_boundary import Start
 
 
 @dataclass(frozen=True, slots=True)

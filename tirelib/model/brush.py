@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.brush.predict import PointConditions, PointForces, PointParameters
-from tirelib.brush.shaped import predict_shaped
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.physics.brush.predict import PointConditions, PointForces, PointParameters
+from tirelib.physics.brush.shaped import predict_shaped
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,8 +65,8 @@ class BrushState:
     a : [m]
         Half the contact length.
     flatness, ring_flatness : [-]
-        Flatness of the pressure (`tirelib.brush.shaped`): as it is, and that of the tire's ring; 1
-        where no ring is known.
+        Flatness of the pressure (`tirelib.physics.brush.shaped`): as it is, and that of the tire's
+        ring; 1 where no ring is known.
     camber_thrust : [-]
         Slip angle that a radian of camber is worth.
     slip_angle, slip_ratio : [rad], [-]

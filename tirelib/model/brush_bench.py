@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.brush.predict import PointParameters
 from tirelib.core.arrays import FloatArray
 from tirelib.effects import Effect
 from tirelib.model.brush import BrushConditions, brush_forces, brush_state
+from tirelib.physics.brush.predict import PointParameters
 
 POINTS = 300
 REFERENCE = (4000.0, 2.0e5)

@@ -10,9 +10,9 @@ so that the balance with the carcass is not solved again.
 
 import numpy as np
 
-from tirelib.brush.predict import PointForces
 from tirelib.core.arrays import FloatArray
 from tirelib.model.brush import BrushState, brush_forces
+from tirelib.physics.brush.predict import PointForces
 
 STEP = 1e-6
 """Step of a derivative, over the size of what it moves."""

@@ -11,13 +11,13 @@ from itertools import takewhile
 
 import numpy as np
 
-from tirelib.contact import radial
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError
 from tirelib.measured.signal import LowPass
 from tirelib.model.state import CONSTANTS, State
-from tirelib.ring.compliance import compliance
-from tirelib.strain.innerliner import strain_harmonics
+from tirelib.physics.contact import radial
+from tirelib.physics.ring.compliance import compliance
+from tirelib.physics.strain.innerliner import strain_harmonics
 
 STAGES = ("constants", "contact", "strain", "gage")
 Change = Callable[[State], State]

@@ -12,7 +12,6 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from tirelib.contact.free_boundary import Start
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError
 from tirelib.measured.signal import LowPass
@@ -32,6 +31,7 @@ from tirelib.model.chain import (
 )
 from tirelib.model.rolled import Made, made_of
 from tirelib.model.state import Operating, State
+from tirelib.physics.contact.free_boundary import Start
 from tirelib.rolling.assemble import Unknowns
 from tirelib.rolling.constants import STIFFEST, Constants
 from tirelib.rolling.gage import Gage

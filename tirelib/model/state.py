@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.contact.free_boundary import Start
-from tirelib.contact.radial import RadialContact
-from tirelib.contact.tread import Tread
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
-from tirelib.ring.ring import ComplexArray, Ring
+from tirelib.physics.contact.free_boundary import Start
+from tirelib.physics.contact.radial import RadialContact
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.ring import ComplexArray, Ring
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +85,10 @@ class State:
         Ring radius R, free radius R0, belt width b, tread thickness h0, gage offset y < 0.
     EI, mass, tension_pressure, k_u, k_v, softening, damping, EA, GA, rotary_inertia, inertia_share,
     tension, dashpots
-        Parameters of the ring (`tirelib.ring.ring.Ring`); tension_pressure is p of the tension p b
-        R, and GA is the tire's less that tension.
+        Parameters of the ring (`tirelib.physics.ring.ring.Ring`); tension_pressure is p of the
+        tension p b R, and GA is the tire's less that tension.
     k_t, hardening
-        Parameters of the tread (`tirelib.contact.tread.Tread`).
+        Parameters of the tread (`tirelib.physics.contact.tread.Tread`).
     lateral : float, [m]
         Position of the gage (ISO, left positive).
     deflection : shape (n_points,), [m]

@@ -11,16 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.contact import radial, shear
-from tirelib.contact.free_boundary import ComplianceAt
-from tirelib.contact.radial import RadialContact
-from tirelib.contact.shear import ShearContact
-from tirelib.contact.tread import Tread
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.core.parameters import FIELDS, Tire
 from tirelib.core.threads import one_thread
 from tirelib.core.units import from_si
+from tirelib.physics.contact import radial, shear
+from tirelib.physics.contact.free_boundary import ComplianceAt
+from tirelib.physics.contact.radial import RadialContact
+from tirelib.physics.contact.shear import ShearContact
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import Compliance, compliance
+from tirelib.physics.ring.ring import ComplexArray, Ring
+from tirelib.physics.strain.innerliner import strain_harmonics
 from tirelib.report.simulation_peaks import Peaks, extreme, find_peaks
 from tirelib.report.simulation_series import (
     FINE_ANGLES_PER_ANGLE,
@@ -31,9 +34,6 @@ from tirelib.report.simulation_series import (
     nodes,
     on_grid,
 )
-from tirelib.ring.compliance import Compliance, compliance
-from tirelib.ring.ring import ComplexArray, Ring
-from tirelib.strain.innerliner import strain_harmonics
 
 CONTACTS = ("radial", "shear")
 N_SHEAR_NODES = 80

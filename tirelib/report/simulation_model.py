@@ -18,6 +18,7 @@ from tirelib.measured.signal import LowPass
 from tirelib.model.base import predict
 from tirelib.model.solution import Solution, solved
 from tirelib.model.state import Operating, State
+from tirelib.physics.ring.ring import ComplexArray
 from tirelib.report.simulation import (
     N_ANGLES,
     Simulation,
@@ -25,7 +26,6 @@ from tirelib.report.simulation import (
     check_turn_rate,
     points_of,
 )
-from tirelib.ring.ring import ComplexArray
 
 TURN = np.linspace(-np.pi, np.pi, N_ANGLES - 1, endpoint=False)
 """Angles of the curves, the last of which is the first; every fourth is one of `GRID`."""

@@ -10,11 +10,11 @@ with many.
 
 import numpy as np
 
-from tirelib.contact.shear import ShearContact
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import Tire
-from tirelib.ring.compliance import Compliance
-from tirelib.ring.ring import ComplexArray
+from tirelib.physics.contact.shear import ShearContact
+from tirelib.physics.ring.compliance import Compliance
+from tirelib.physics.ring.ring import ComplexArray
 
 LEAST_MODES = 200
 MOST_MODES = 1000

@@ -7,9 +7,9 @@ from pathlib import Path
 from cosim.vehicle14.model import Vehicle
 from cosim.vehicle14.parameters import VehicleParameters
 from cosim.vehicle14.tire import BrushTires, tires_of
-from tirelib.brush import predict
 from tirelib.core.errors import ParameterError
 from tirelib.core.parameters.tire_file import models_folder
+from tirelib.physics.brush import predict
 
 TIRE_FILE = models_folder() / "vehicle14" / "tire.toml"
 

@@ -16,11 +16,11 @@ from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from cosim.vehicle14.tire import FORMAT, NAMES, BrushTires
-from tirelib.brush import predict
 from tirelib.core.arrays import FloatArray
 from tirelib.core.threads import one_thread
 from tirelib.fmu.virtual.spec import default_surface
 from tirelib.fmu.virtual.surface import read_surface
+from tirelib.physics.brush import predict
 
 TARGET = Path(__file__).parents[3] / "models" / "vehicle14" / "tire.toml"
 START = {

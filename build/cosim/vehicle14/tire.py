@@ -42,7 +42,7 @@ class BrushTires:
     constants : mapping
         By `NAMES`; SI.
     law : module
-        `tirelib.brush.predict`, or the copy of it that an FMU carries.
+        `tirelib.physics.brush.predict`, or the copy of it that an FMU carries.
     """
 
     constants: Mapping[str, float]

@@ -5,11 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.brush.forces import brush_distribution, brush_forces
-from tirelib.brush.parabola import aligning_moment, bristle_stiffness, lateral_force, sliding_angle
-from tirelib.brush.parameters import BrushParameters, Carcass
-from tirelib.contact.profiles import convex_concave, parabola, power_law, sampled
 from tirelib.core.errors import ConvergenceError, ParameterError, ShapeError
+from tirelib.physics.brush.forces import brush_distribution, brush_forces
+from tirelib.physics.brush.parabola import (
+    aligning_moment,
+    bristle_stiffness,
+    lateral_force,
+    sliding_angle,
+)
+from tirelib.physics.brush.parameters import BrushParameters, Carcass
+from tirelib.physics.contact.profiles import convex_concave, parabola, power_law, sampled
 
 MU, LOAD, A, STIFFNESS = 0.9, 4000.0, 0.06, 6e4
 CPY = STIFFNESS / (2 * A**2)

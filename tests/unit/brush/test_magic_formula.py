@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.brush.magic_formula import fit_sine, lateral_curve, sine_curve
 from tirelib.core.errors import ParameterError
+from tirelib.physics.brush.magic_formula import fit_sine, lateral_curve, sine_curve
 
 TRUE = {"C_alpha": 9e4, "D": 4200.0, "C": 1.4, "E": -0.5, "S_h": 0.002, "S_v": -40.0}
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tirelib.brush.mf import magic_forces
-from tirelib.brush.mf_tire import Coefficients, MagicTire, magic_tire
-from tirelib.brush.tir import parse_tir
 from tirelib.core.errors import FormatError, ParameterError, ShapeError
+from tirelib.physics.brush.mf import magic_forces
+from tirelib.physics.brush.mf_tire import Coefficients, MagicTire, magic_tire
+from tirelib.physics.brush.tir import parse_tir
 
 HEAD = """[UNITS]
 LENGTH='meter'

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.unit.brush.test_mf import EVERY_5, FZ0, LOADS, PLAIN, R0, SHIFTS, tire
-from tirelib.brush.mf import NEW, magic_forces
+from tirelib.physics.brush.mf import NEW, magic_forces
 
 BARE = {k: v for k, v in PLAIN.items() if k[0] == "P"} | {"QBZ1": 9.0, "QCZ1": 1.15, "QDZ1": 0.11}
 TRAIL = 0.11 * R0 / FZ0 * LOADS

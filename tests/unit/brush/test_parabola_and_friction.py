@@ -5,12 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.brush.friction import (
+from tirelib.core.errors import ParameterError
+from tirelib.physics.brush.friction import (
     friction_from_moment,
     friction_from_stiffness,
     friction_from_two_angles,
 )
-from tirelib.brush.parabola import (
+from tirelib.physics.brush.parabola import (
     aligning_moment,
     bristle_stiffness,
     friction_at_angle,
@@ -18,7 +19,6 @@ from tirelib.brush.parabola import (
     lateral_force,
     sliding_angle,
 )
-from tirelib.core.errors import ParameterError
 
 LOAD, A, STIFFNESS = 4000.0, 0.06, 6e4
 CPY = STIFFNESS / (2 * A**2)

@@ -5,12 +5,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.brush.forces import BrushForces, brush_forces
-from tirelib.brush.parabola import aligning_moment, lateral_force
-from tirelib.brush.parameters import BrushParameters, Carcass
-from tirelib.brush.predict import PointConditions, PointForces, PointParameters, predict_forces
-from tirelib.contact.profiles import parabola
 from tirelib.core.errors import ConvergenceError, ParameterError, ShapeError
+from tirelib.physics.brush.forces import BrushForces, brush_forces
+from tirelib.physics.brush.parabola import aligning_moment, lateral_force
+from tirelib.physics.brush.parameters import BrushParameters, Carcass
+from tirelib.physics.brush.predict import (
+    PointConditions,
+    PointForces,
+    PointParameters,
+    predict_forces,
+)
+from tirelib.physics.contact.profiles import parabola
 
 MU, LOAD, A = 0.9, 4000.0, 0.06
 CPY = 6e4 / (2 * A**2)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tirelib.brush import shaped
+from tirelib.physics.brush import shaped
 
 
 def test_the_ends_of_sticking_are_found_in_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.brush.tir import (
+from tirelib.core.errors import FormatError, ParameterError
+from tirelib.physics.brush.tir import (
     TirEntry,
     TirFile,
     TirLine,
@@ -16,8 +17,7 @@ from tirelib.brush.tir import (
     read_tir,
     write_tir,
 )
-from tirelib.brush.tir_units import BASES, factor, words
-from tirelib.core.errors import FormatError, ParameterError
+from tirelib.physics.brush.tir_units import BASES, factor, words
 
 UNITS = "LENGTH='meter'\nFORCE='newton'\nANGLE='radians'\nMASS='kg'\nTIME='second'\n"
 TEXT = f"""! invented numbers, no real tire

@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from tirelib.contact.profiles import (
+from tirelib.core.errors import ParameterError, ShapeError
+from tirelib.physics.contact.profiles import (
     PressureProfile,
     convex_concave,
     parabola,
     power_law,
     sampled,
 )
-from tirelib.core.errors import ParameterError, ShapeError
 
 A1, A2 = -0.06, 0.05
 H = 0.055

@@ -8,7 +8,6 @@ import pytest
 from scipy.stats import norm
 
 from tests.physics.test_effects import BASE, FREE_ROLLING, PLAN, TIRE, VALUES, run, tangents, wave
-from tirelib.contact.fourier import evaluate
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
@@ -18,8 +17,9 @@ from tirelib.measured.waveforms import GRID
 from tirelib.model.base import linearised, predict
 from tirelib.model.solution import solved
 from tirelib.model.state import State
-from tirelib.ring.compliance import compliance
-from tirelib.ring.ring import ComplexArray
+from tirelib.physics.contact.fourier import evaluate
+from tirelib.physics.ring.compliance import compliance
+from tirelib.physics.ring.ring import ComplexArray
 
 
 def at(name: str, strength: float | tuple[float, ...], **given: Any) -> State:

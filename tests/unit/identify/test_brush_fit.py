@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
 from tirelib.campaign import (
     CampaignHeader,
     Run,
@@ -24,6 +23,7 @@ from tirelib.identify.brush_study import stiffness_at
 from tirelib.identify.error_bands import band_errors, bands, levels
 from tirelib.identify.force_data import ForceData, force_data
 from tirelib.identify.ring_patch import half_lengths, ring_contact
+from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
 
 C, MU, A0, N = 8e6, 0.95, 0.062, 0.45
 LOADS = (1500.0, 3000.0, 4500.0, 6000.0)

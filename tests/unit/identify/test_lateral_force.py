@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tirelib.brush.forces import brush_forces
-from tirelib.brush.parameters import BrushParameters
 from tirelib.campaign import read_campaign
-from tirelib.contact.profiles import PressureProfile
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import Tire, read_tire
 from tirelib.identify.force_data import ForceData, force_data
 from tirelib.identify.forces import _compared
 from tirelib.identify.lateral_force import KINDS, PressureBand, compare_pressures
 from tirelib.identify.ring_patch import profiles, ring_contact
+from tirelib.physics.brush.forces import brush_forces
+from tirelib.physics.brush.parameters import BrushParameters
+from tirelib.physics.contact.profiles import PressureProfile
 from tirelib.rig.campaign import run_plan
 from tirelib.rig.plans import Plan
 from tirelib.rig.tire import Condition, RigTire

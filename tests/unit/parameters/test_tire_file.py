@@ -10,13 +10,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tirelib.contact.radial import load
-from tirelib.contact.tread import Tread
 from tirelib.core.errors import FormatError, ParameterError
 from tirelib.core.parameters import FIELDS, Number, Tire, TireFile, find_tire, read_tire, write_tire
 from tirelib.core.parameters.tire_file import KINDS, models_folder
-from tirelib.ring.compliance import compliance
-from tirelib.ring.ring import Ring
+from tirelib.physics.contact.radial import load
+from tirelib.physics.contact.tread import Tread
+from tirelib.physics.ring.compliance import compliance
+from tirelib.physics.ring.ring import Ring
 
 SHIPPED = ["gong", "jenkins", "kim", "table-6-1", "table-6-2-195-65r15", "zegelaar"]
 BASE = read_tire("table-6-1")

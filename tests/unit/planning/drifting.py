@@ -5,12 +5,12 @@ from functools import cache
 import numpy as np
 
 from tests.unit.force_points import MODEL
-from tirelib.brush.predict import PointConditions, PointParameters, predict_forces
 from tirelib.core.arrays import FloatArray
 from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.diagnose.forces.fit import MeasuredForce
 from tirelib.identify.force_data import ForceData
 from tirelib.identify.force_points import force_points
+from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
 
 PRESSURES = (1.7e5, 2.0e5, 2.3e5)
 LOADS = (2e3, 4e3, 6e3)

@@ -1,0 +1,1 @@
+"""Equations of a tire: flexible ring, contact, strain of the innerliner, brush."""
