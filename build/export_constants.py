@@ -1,9 +1,9 @@
 """Half and double of the numbers of `tirelib export`, on made-up tires of the brush.
 
 Prints one table for each constant of `tirelib.physics.brush.mf_fit` and
-`tirelib.compare.magic_points`: the error that it admits, or the error of the fitted Magic Formula
-against the brush, at half of it, at itself and at double. Takes two minutes: ``.venv/bin/python
-build/export_constants.py``.
+`tirelib.inference.compare.magic_points`: the error that it admits, or the error of the fitted Magic
+Formula against the brush, at half of it, at itself and at double. Takes two minutes:
+``.venv/bin/python build/export_constants.py``.
 """
 
 import sys
@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.compare import magic_points
-from tirelib.compare.force_model import ForceModel, force_model_of
 from tirelib.core.errors import CalibrationError
 from tirelib.core.parameters import Number, TireFile
 from tirelib.core.threads import one_thread
+from tirelib.inference.compare import magic_points
+from tirelib.inference.compare.force_model import ForceModel, force_model_of
 from tirelib.physics.brush import mf_fit
 from tirelib.physics.brush.mf import magic_forces
 from tirelib.physics.brush.mf_fit import MagicPoints, fit_magic

@@ -1,4 +1,4 @@
-"""How the noise of forces depends on the constants of `tirelib.identify.force_noise`.
+"""How the noise of forces depends on the constants of `tirelib.inference.identify.force_noise`.
 
     python build/force_noise.py [CAMPAIGN...]
 
@@ -16,9 +16,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.magic_sweep import Sweep, magic_sweep
 from tirelib.campaign import read_campaign
 from tirelib.core.threads import one_thread
-from tirelib.identify import force_noise
-from tirelib.identify.force_data import FORCES, force_data
-from tirelib.identify.force_points import ForcePoints, force_points
+from tirelib.inference.identify import force_noise
+from tirelib.inference.identify.force_data import FORCES, force_data
+from tirelib.inference.identify.force_points import ForcePoints, force_points
 
 CONSTANTS = ("FEWEST_NEIGHBOURS", "MOST_NEIGHBOURS", "NEIGHBOUR_REACH", "STEEPEST")
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from tirelib import infer
 from tirelib.core.parameters import read_tire
 from tirelib.effects import CATALOGUE
-from tirelib.infer.plain import load
+from tirelib.inference.diagnose.diagnose import TABLE
+from tirelib.inference.statistics.plain import load
 from tirelib.physics.brush.parabola import (
     aligning_moment,
     bristle_stiffness,
@@ -264,7 +264,7 @@ def sheared_tread(axes: Panels) -> None:
 
 def plain_tires(axes: Panels) -> None:
     """Draw what plain tires show of each effect: mean and standard deviation over a family."""
-    families, _ = load(Path(infer.__file__).parent / "plain_tires.npz")
+    families, _ = load(TABLE)
     names = [name for name in families[0].means if name in CATALOGUE]
     for k, family in enumerate(families):
         mean = [family.means[name] for name in names]

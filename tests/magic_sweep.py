@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.identify.force_data import ForceData
+from tirelib.inference.identify.force_data import ForceData
 
 LOADS = (500.0, 1100.0, 1700.0, 2300.0, 2900.0)
 PRESSURES = (0.7e5, 0.83e5, 0.97e5)

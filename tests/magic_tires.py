@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tests.unit.brush.test_mf import HEAD, PLAIN
-from tirelib.identify.force_data import ForceData
+from tirelib.inference.identify.force_data import ForceData
 from tirelib.physics.brush.mf import magic_forces
 from tirelib.physics.brush.mf_tire import MagicTire, magic_tire
 from tirelib.physics.brush.tir import parse_tir

@@ -16,9 +16,7 @@ is quick:
 =====================================================  ==========================================
 """
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -66,11 +64,11 @@ _HOMES = {
     "candidate_table": "tirelib.tables",
     "check_campaign": "tirelib.campaign",
     "check_fmu": "tirelib.fmu.check",
-    "compare": "tirelib.compare",
-    "diagnose": "tirelib.diagnose",
+    "compare": _JOURNEY,
+    "diagnose": _JOURNEY,
     "estimate_table": "tirelib.tables",
     "feature_table": "tirelib.tables",
-    "identify": "tirelib.identify",
+    "identify": _JOURNEY,
     "import_campaign": "tirelib.campaign.importing.importer",
     "observe": "tirelib.measured.observations",
     "parameter_table": "tirelib.tables",
@@ -82,37 +80,13 @@ _HOMES = {
     "write_calibration": "tirelib.estimators.calibration_file",
     "write_tire": "tirelib.core.parameters",
 }
-"""The module of each name; three names are those of a package, see `_Verb`."""
-
-
-class _Verb(ModuleType):
-    """A package that bears the name of a verb: called, it does what `tirelib.journey` does.
-
-    A package becomes an attribute of `tirelib` as soon as any of its modules is imported, so the
-    function of the same name could not stand there in every order of imports.
-    """
-
-    def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        return getattr(import_module(_JOURNEY), self.__name__.rpartition(".")[2])(*args, **kwargs)
-
-
-class _Tirelib(ModuleType):
-    def __setattr__(self, name: str, value: Any) -> None:
-        if isinstance(value, ModuleType) and _HOMES.get(name) == value.__name__:
-            value.__class__ = _Verb
-        super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Tirelib
+"""The module of each name."""
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    home = import_module(_HOMES[name])
-    if _HOMES[name] == f"{__name__}.{name}":
-        return home
-    globals()[name] = value = getattr(home, name)
+    globals()[name] = value = getattr(import_module(_HOMES[name]), name)
     return value
 
 

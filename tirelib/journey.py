@@ -12,13 +12,13 @@ from tirelib.core.errors import CalibrationError, ParameterError
 
 if TYPE_CHECKING:
     from tirelib.campaign import Campaign
-    from tirelib.compare import Comparison, ForceComparison
     from tirelib.core.arrays import FloatArray
     from tirelib.core.parameters import TireFile
-    from tirelib.diagnose.document import Assessment
-    from tirelib.diagnose.forces.assess import ForceAssessment
     from tirelib.effects import Effect
-    from tirelib.identify.whole import Whole
+    from tirelib.inference.compare import Comparison, ForceComparison
+    from tirelib.inference.diagnose.document import Assessment
+    from tirelib.inference.diagnose.forces.assess import ForceAssessment
+    from tirelib.inference.identify.whole import Whole
     from tirelib.report.simulation import Simulation
 
 QUANTITIES = ("strain", "Fy", "Fx", "Mz")
@@ -57,7 +57,7 @@ def identify(
     ParameterError
         If the geometry of `start` contradicts that of the campaign.
     """
-    from tirelib.identify.whole import identify_whole
+    from tirelib.inference.identify.whole import identify_whole
 
     return identify_whole(campaign, start, base=base, progress=progress)
 
@@ -91,7 +91,7 @@ def compare(
     CalibrationError
         If the campaign does not hold the quantity, or the model does not predict it.
     """
-    from tirelib.compare import compare as compare_model
+    from tirelib.inference.compare import compare as compare_model
 
     catalogue = _catalogue(effects)
     return compare_model(campaign, model, quantity, effects=catalogue, progress=progress)
@@ -123,14 +123,14 @@ def diagnose(
     catalogue = _catalogue(effects)
     effects_of = list(catalogue.values())
     if explains_forces(quantity, campaign, model):
-        from tirelib.diagnose.forces.assess import assess_forces, force_case
+        from tirelib.inference.diagnose.forces.assess import assess_forces, force_case
 
         case = force_case(campaign, model, catalogue, quantity)
         return assess_forces(case, effects_of, false_alarm=false_alarm, progress=progress)
-    from tirelib.compare.model import model_of
-    from tirelib.diagnose.diagnose import diagnose as diagnose_strain
-    from tirelib.diagnose.document import assess
-    from tirelib.identify.campaign_data import straight_runs
+    from tirelib.inference.compare.model import model_of
+    from tirelib.inference.diagnose.diagnose import diagnose as diagnose_strain
+    from tirelib.inference.diagnose.document import assess
+    from tirelib.inference.identify.campaign_data import straight_runs
     from tirelib.measured.waveforms import measure_waveforms
 
     given = model_of(model, catalogue)
@@ -186,8 +186,8 @@ def add(
     CalibrationError
         If the campaign cannot inform the effect.
     """
-    from tirelib.extend.additions import additions
-    from tirelib.extend.extension import known_effect
+    from tirelib.inference.extend.additions import additions
+    from tirelib.inference.extend.extension import known_effect
 
     _check_quantity(quantity)
     catalogue = _catalogue(effects)
@@ -231,7 +231,7 @@ def simulate(
     """
     import numpy as np
 
-    from tirelib.compare.model import model_of
+    from tirelib.inference.compare.model import model_of
     from tirelib.report.simulation import simulate as simulate_tire
     from tirelib.report.simulation_model import simulate_file
 
@@ -265,8 +265,8 @@ def explains_forces(quantity: str | None, campaign: "Campaign", model: "TireFile
         If strain is asked for and not measured, or is all that the campaign holds and the model has
         no ring.
     """
-    from tirelib.compare.compare import needs_ring
-    from tirelib.identify.strain_notes import is_straight
+    from tirelib.inference.compare.compare import needs_ring
+    from tirelib.inference.identify.strain_notes import is_straight
 
     header = campaign.header
     _check_quantity(quantity)

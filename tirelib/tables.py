@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tirelib.core.parameters import TireFile
-    from tirelib.diagnose.document import Assessment
-    from tirelib.diagnose.forces.assess import ForceAssessment
     from tirelib.estimators.calibration import Estimates
+    from tirelib.inference.diagnose.document import Assessment
+    from tirelib.inference.diagnose.forces.assess import ForceAssessment
     from tirelib.measured.observations import Observations
 
 UNITS = {"time": "s", "Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
@@ -156,8 +156,8 @@ def candidate_table(found: "Assessment | ForceAssessment") -> "pd.DataFrame":
     """
     import pandas as pd  # slow to import
 
-    from tirelib.diagnose.document import Assessment, diagnosis_document
-    from tirelib.diagnose.forces.document import force_diagnosis_document
+    from tirelib.inference.diagnose.document import Assessment, diagnosis_document
+    from tirelib.inference.diagnose.forces.document import force_diagnosis_document
 
     if isinstance(found, Assessment):
         document = diagnosis_document(found)

@@ -1,13 +1,13 @@
 """A campaign of forces as the library sees it: the identified brush, and the problem."""
 
-from tirelib.compare.force_model import ForceModel
 from tirelib.effects import CATALOGUE
-from tirelib.identify.brush_fit import fit_brush
-from tirelib.identify.brush_model import BrushModel
-from tirelib.identify.force_data import ForceData
-from tirelib.identify.force_noise import force_noise
-from tirelib.identify.force_points import force_points
-from tirelib.problems.forces import ForceProblem
+from tirelib.inference.compare.force_model import ForceModel
+from tirelib.inference.identify.brush_fit import fit_brush
+from tirelib.inference.identify.brush_model import BrushModel
+from tirelib.inference.identify.force_data import ForceData
+from tirelib.inference.identify.force_noise import force_noise
+from tirelib.inference.identify.force_points import force_points
+from tirelib.inference.problems.forces import ForceProblem
 
 
 def problem_of(data: ForceData, quantity: str) -> ForceProblem:

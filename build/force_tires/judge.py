@@ -22,8 +22,8 @@ from force_tires.learn import OUT, say, seeds
 from force_tires.plans import KNOWN, UNKNOWN, case
 from tirelib.core.errors import TirelibError
 from tirelib.core.threads import one_thread
-from tirelib.infer.plain import covering, load
-from tirelib.infer.select import Verdict, select
+from tirelib.inference.statistics.plain import covering, load
+from tirelib.inference.statistics.select import Verdict, select
 
 
 def main() -> None:

@@ -3,9 +3,9 @@
     python build/force_tires/learn.py
     python build/force_tires/learn.py --quantities Fy,Mz,Fx --out build/out
 
-Writes tirelib/infer/plain_Fy.npz (plain_Fx.npz, plain_Mz.npz) with its seeds and the families'
-hash, and prints which plain tires are said to lack something, each judged by the other families,
-to first order.
+Writes tirelib/inference/statistics/plain_Fy.npz (plain_Fx.npz, plain_Mz.npz) with its seeds and the
+families' hash, and prints which plain tires are said to lack something, each judged by the other
+families, to first order.
 """
 
 import argparse
@@ -26,14 +26,14 @@ from force_tires.families import FAMILIES
 from force_tires.plans import case
 from tirelib.core.errors import TirelibError
 from tirelib.core.threads import one_thread
-from tirelib.infer.hypothesis import judged
-from tirelib.infer.null import OWN
-from tirelib.infer.plain import Family, covering, learn, save
-from tirelib.infer.posterior import Posterior, posterior
-from tirelib.problems.forces import ForceProblem
+from tirelib.inference.problems.forces import ForceProblem
+from tirelib.inference.statistics.hypothesis import judged
+from tirelib.inference.statistics.null import OWN
+from tirelib.inference.statistics.plain import Family, covering, learn, save
+from tirelib.inference.statistics.posterior import Posterior, posterior
 
 HERE = Path(__file__).parent
-OUT = Path(__file__).parents[2] / "tirelib" / "infer"
+OUT = Path(__file__).parents[2] / "tirelib" / "inference" / "statistics"
 FIRST = {"effect": 0.1**2, "shape": 0.01**2}
 """Variances of the fits from which the learning starts."""
 LARGEST = 32.0
@@ -108,7 +108,7 @@ def main() -> None:
 
 
 def families_sha256() -> str:
-    """Return the hash of the families and plans, without what is only said of them."""
+    """Return the hash of the families and plans, without texts and without imports."""
     hashed = hashlib.sha256()
     for name in ("families.py", "plans.py"):
         tree = ast.parse((HERE / name).read_text())
@@ -116,7 +116,8 @@ def families_sha256() -> str:
             body = getattr(node, "body", None)
             if isinstance(body, list):
                 said = (
-                    isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant)
+                    isinstance(each, ast.ImportFrom)
+                    or (isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant))
                     for each in body
                 )
                 node.body = [each for each, text in zip(body, said, strict=True) if not text]  # type: ignore[attr-defined]

@@ -15,7 +15,7 @@ import numpy as np
 
 from force_tires.families import FAMILIES, Changes, Setting
 from tirelib.core.arrays import FloatArray, IntArray
-from tirelib.identify.force_data import ForceData
+from tirelib.inference.identify.force_data import ForceData
 
 RATE, PERIOD, PAUSE = 12.0, 12.0, 8.0
 """Samples a second, length of a sweep and pause after it [s]."""

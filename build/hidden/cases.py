@@ -21,9 +21,9 @@ from hidden.measured import CACHE, Plain, Planted, blank, keep, plain, traces, w
 from hidden.plan import day
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import TirelibError
-from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.identify import estimated
-from tirelib.identify.waveform_fit import WaveformFit
+from tirelib.inference.identify.campaign_data import straight_runs
+from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.waveform_fit import WaveformFit
 from tirelib.measured.waveforms import Waveforms
 from tirelib.model.slopes import slopes_of
 from tirelib.rig.hidden import HIDDEN

@@ -17,23 +17,23 @@ from scipy.linalg import subspace_angles
 
 from next_test.pair import REFERENCE, Pair, PairCase, foretold, look_alikes, open_still
 from tests.magic_sweep import _force
-from tirelib.compare.force_model import ForceModel
 from tirelib.core.arrays import FloatArray
-from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.fit import MeasuredForce
-from tirelib.diagnose.forces.models import plain_tires
 from tirelib.effects import CATALOGUE
-from tirelib.identify.brush_fit import fit_brush
-from tirelib.identify.brush_model import BrushModel
-from tirelib.identify.force_data import ForceData
-from tirelib.identify.force_points import force_points
-from tirelib.infer.problem import Point
-from tirelib.infer.select import Hypotheses
-from tirelib.planning.envelope import Envelope
-from tirelib.planning.force_runs import bench_ahead, force_axes, force_envelope
-from tirelib.planning.next_test import next_test
-from tirelib.planning.suspects import given_suspects
-from tirelib.problems.forces import ForceProblem
+from tirelib.inference.compare.force_model import ForceModel
+from tirelib.inference.diagnose.forces.assess import ForceCase
+from tirelib.inference.diagnose.forces.fit import MeasuredForce
+from tirelib.inference.diagnose.forces.models import plain_tires
+from tirelib.inference.identify.brush_fit import fit_brush
+from tirelib.inference.identify.brush_model import BrushModel
+from tirelib.inference.identify.force_data import ForceData
+from tirelib.inference.identify.force_points import force_points
+from tirelib.inference.planning.envelope import Envelope
+from tirelib.inference.planning.force_runs import bench_ahead, force_axes, force_envelope
+from tirelib.inference.planning.next_test import next_test
+from tirelib.inference.planning.suspects import given_suspects
+from tirelib.inference.problems.forces import ForceProblem
+from tirelib.inference.statistics.problem import Point
+from tirelib.inference.statistics.select import Hypotheses
 
 NOISE = 8.0
 """Noise of a point's side force [N]."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
-from tirelib.infer.select import Hypotheses
-from tirelib.planning.criterion import NextTest
+from tirelib.inference.planning.criterion import NextTest
+from tirelib.inference.statistics.select import Hypotheses
 
 CACHE = Path(__file__).parents[1] / "out" / "next_test"
 A_PLAN = 3

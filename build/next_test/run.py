@@ -28,24 +28,16 @@ from next_test import forces
 from next_test.pair import CACHE, cases_of, open_still
 from tirelib.core.errors import TirelibError
 from tirelib.core.threads import one_thread
-from tirelib.planning.document import PROMISING
+from tirelib.inference.planning.document import PROMISING
 
 VISIBLE = 17.0
 """Chi-square by which the campaign alone shows the effect, against none, in the metric of what
 plain tires show."""
 _PARTS = (
-    "diagnose",
     "effects",
-    "identify",
+    "inference",
     "model",
-    "planning",
-    "contact",
-    "ring",
-    "strain",
-    "brush",
-    "compare",
-    "infer",
-    "problems",
+    "physics",
 )
 STAGES = {
     "before": "before",

@@ -18,9 +18,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from tests.magic_tires import ANGLES, LOADS, RATIOS, magic, magic_data
 from tirelib.core.threads import one_thread
-from tirelib.identify.brush_estimates import estimates_of, slip_stiffness
-from tirelib.identify.brush_fit import fit_brush
-from tirelib.identify.brush_study import study_of
+from tirelib.inference.identify.brush_estimates import estimates_of, slip_stiffness
+from tirelib.inference.identify.brush_fit import fit_brush
+from tirelib.inference.identify.brush_study import study_of
 from tirelib.physics.brush.mf import magic_forces
 
 FEW = (2000.0, 4000.0, 6000.0)

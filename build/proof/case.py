@@ -12,8 +12,8 @@ from proof.laboratory import CREEP, laboratory, press
 from proof.tires import CACHE, measured
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.parameters import Tire
-from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.identify import estimated
+from tirelib.inference.identify.campaign_data import straight_runs
+from tirelib.inference.identify.identify import estimated
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import Waveforms
 from tirelib.model.base import operating_points, values_of
@@ -42,9 +42,9 @@ def fingerprint() -> str:
         "noise",
         "random_effects",
     )
-    files = [root / "identify" / f"{name}.py" for name in names]
+    files = [root / "inference" / "identify" / f"{name}.py" for name in names]
     files += [root / "model" / f"{name}.py" for name in ("base", "chain", "solution", "state")]
-    files += [root / "model" / "rolled.py", *sorted((root / "rolling").glob("*.py"))]
+    files += [root / "model" / "rolled.py", *sorted((root / "physics" / "rolling").glob("*.py"))]
     return _hash(*files, Path(__file__), *_LABORATORY)
 
 

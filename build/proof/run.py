@@ -24,7 +24,7 @@ from proof.case import case
 from proof.tires import CACHE
 from tirelib import __version__
 from tirelib.core.threads import one_thread
-from tirelib.identify.structure import STRUCTURE_STD
+from tirelib.inference.identify.structure import STRUCTURE_STD
 
 TYPICAL = {
     "radial_pressure_slope": 1.0,

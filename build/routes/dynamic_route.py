@@ -40,7 +40,7 @@ from routes.static_route_fit import Quantity
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError, ConvergenceError, ParameterError
 from tirelib.core.parameters import TireFile
-from tirelib.identify.campaign_data import StraightRuns
+from tirelib.inference.identify.campaign_data import StraightRuns
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,7 +28,7 @@ from routes.edges import EdgeReading, read_edges
 from routes.static_route_fit import Parameter, Quantity, fit_few
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
-from tirelib.identify.campaign_data import StraightRuns
+from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.measured.signal import LowPass
 from tirelib.model.base import operating_points
 from tirelib.model.state import Operating

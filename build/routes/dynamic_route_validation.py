@@ -7,7 +7,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
-from tirelib.identify.campaign_data import StraightRuns
+from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.measured.waveforms import GRID
 from tirelib.model.state import Operating, State
 from tirelib.physics.contact import radial

@@ -8,7 +8,7 @@ from routes.static_route import StaticRoute, static_route
 from routes.static_route_fit import Quantity
 from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import TireFile
-from tirelib.identify.campaign_data import StraightRuns
+from tirelib.inference.identify.campaign_data import StraightRuns
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,8 +26,8 @@ from tirelib.campaign import read_campaign
 from tirelib.cli.common import write_json
 from tirelib.core.parameters import read_tire
 from tirelib.core.threads import one_thread
-from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.identify import start_file
+from tirelib.inference.identify.campaign_data import straight_runs
+from tirelib.inference.identify.identify import start_file
 from tirelib.measured.waveforms import measure_waveforms
 
 FORMAT = "routes/1"

@@ -32,7 +32,7 @@ from routes.static_route_problem import Conventional, StrainProblem
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import CalibrationError, ConvergenceError, ParameterError
 from tirelib.core.parameters import TireFile
-from tirelib.identify.campaign_data import StraightRuns
+from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.model.base import operating_points, values_of
 from tirelib.physics.contact.static import StaticContact
 

@@ -6,7 +6,7 @@ from routes.static_route_fit import FewFit, Parameter, Quantity, fit_few, profil
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.core.parameters import TireFile
-from tirelib.identify.campaign_data import StraightRuns
+from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.physics.contact.profiles import convex_concave

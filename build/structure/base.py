@@ -22,13 +22,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from structure.cases import NONE, Case, case_file, load_case
 from structure.make import FAMILIES, OUT, seeds
-from tirelib.compare.error import error_of
-from tirelib.compare.model import Model
 from tirelib.core.threads import one_thread
-from tirelib.identify.campaign_data import StraightRuns, straight_runs
-from tirelib.identify.discrepancy import Discrepancy
-from tirelib.identify.identify import estimate, prior_std, start_file
-from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
+from tirelib.inference.compare.error import error_of
+from tirelib.inference.compare.model import Model
+from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.inference.identify.discrepancy import Discrepancy
+from tirelib.inference.identify.identify import estimate, prior_std, start_file
+from tirelib.inference.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
 from tirelib.model.base import PLAIN, values_of
 from tirelib.model.solution import solved
 

@@ -31,12 +31,12 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import TirelibError
 from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE
-from tirelib.identify.campaign_data import StraightRuns, straight_runs
-from tirelib.identify.identify import estimated
-from tirelib.infer.hypothesis import Hypothesis
-from tirelib.infer.plain import load
-from tirelib.infer.select import Verdict, select
-from tirelib.problems.strain import StrainProblem
+from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.inference.identify.identify import estimated
+from tirelib.inference.problems.strain import StrainProblem
+from tirelib.inference.statistics.hypothesis import Hypothesis
+from tirelib.inference.statistics.plain import load
+from tirelib.inference.statistics.select import Verdict, select
 
 OUTCOMES = ("right", "in a set", "none", "unknown", "form", "wrong", "failed")
 

@@ -3,8 +3,9 @@
     python build/structure/law.py
 
 Fits every campaign with one known effect with that effect, and prints for each family the log
-likelihood of the relative standard deviation of a law (`tirelib.infer.hypothesis.LAWS`), summed
-over its campaigns. The other families' plain tires give the rest of the covariance.
+likelihood of the relative standard deviation of a law
+(`tirelib.inference.statistics.hypothesis.LAWS`), summed over its campaigns. The other families'
+plain tires give the rest of the covariance.
 """
 
 import argparse
@@ -21,13 +22,13 @@ from structure.learn import FAMILIES, OUT, TABLE, say
 from tirelib.core.errors import TirelibError
 from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE
-from tirelib.identify.campaign_data import straight_runs
-from tirelib.infer.hypothesis import law_errors
-from tirelib.infer.null import OWN, Null
-from tirelib.infer.plain import BASE, Family, load, pooled
-from tirelib.infer.posterior import posterior, sizes_at_start
-from tirelib.infer.problem import Point
-from tirelib.problems.strain import StrainProblem
+from tirelib.inference.identify.campaign_data import straight_runs
+from tirelib.inference.problems.strain import StrainProblem
+from tirelib.inference.statistics.hypothesis import law_errors
+from tirelib.inference.statistics.null import OWN, Null
+from tirelib.inference.statistics.plain import BASE, Family, load, pooled
+from tirelib.inference.statistics.posterior import posterior, sizes_at_start
+from tirelib.inference.statistics.problem import Point
 
 GRID = tuple(0.15 * 2.0 ** np.arange(-3, 4))
 

@@ -4,9 +4,10 @@
     python build/structure/learn.py --seeds 2,5,8   of these tires only
 
 Reads the campaigns that `build/structure/make.py` made, identifies and fits each plain one (kept in
-build/out/structure/fits), and writes the library's table tirelib/infer/plain_tires.npz, what the
-families show, and tests/golden/plain_tires.json: the p-value of every plain tire, judged by the
-families other than its own.
+build/out/structure/fits), and writes the library's table
+tirelib/inference/statistics/plain_tires.npz, what the families show, and
+tests/golden/plain_tires.json: the p-value of every plain tire, judged by the families other than
+its own.
 """
 
 import argparse
@@ -28,18 +29,18 @@ from structure.make import seeds
 from tirelib.core.errors import TirelibError
 from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE
-from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.identify import estimated
-from tirelib.infer.hypothesis import judged
-from tirelib.infer.null import OWN
-from tirelib.infer.plain import Family, learn, save
-from tirelib.infer.posterior import Posterior, posterior
-from tirelib.infer.problem import Point
-from tirelib.problems.strain import StrainProblem
+from tirelib.inference.identify.campaign_data import straight_runs
+from tirelib.inference.identify.identify import estimated
+from tirelib.inference.problems.strain import StrainProblem
+from tirelib.inference.statistics.hypothesis import judged
+from tirelib.inference.statistics.null import OWN
+from tirelib.inference.statistics.plain import Family, learn, save
+from tirelib.inference.statistics.posterior import Posterior, posterior
+from tirelib.inference.statistics.problem import Point
 
 ROOT = Path(__file__).parents[2]
 OUT = ROOT / "build" / "out" / "structure"
-TABLE = ROOT / "tirelib" / "infer" / "plain_tires.npz"
+TABLE = ROOT / "tirelib" / "inference" / "statistics" / "plain_tires.npz"
 GOLDEN = ROOT / "tests" / "golden" / "plain_tires.json"
 FAMILIES = ("rig", "continuum", "ring")
 SEEDS = [*range(2, 60, 3), *range(302, 360, 3)]

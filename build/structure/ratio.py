@@ -13,16 +13,16 @@ import numpy as np
 from scipy.optimize import brentq
 
 from structure.family import Array
-from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.delay import by_delay
-from tirelib.identify.identify import estimated
-from tirelib.identify.random_effects import Whitening, scales, tangents, whitening_of
+from tirelib.inference.identify.campaign_data import straight_runs
+from tirelib.inference.identify.delay import by_delay
+from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.random_effects import Whitening, scales, tangents, whitening_of
 from tirelib.measured.waveforms import Waveforms
 from tirelib.model.slopes import slopes_of
 from tirelib.model.solution import solved
 
 DELAY_STD = 1.0
-"""Standard deviation of the delay, in units of `tirelib.identify.delay`: all but free."""
+"""Standard deviation of the delay, in units of `tirelib.inference.identify.delay`: all but free."""
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from structure.family import PHI, POINTS, Array, Frame, Hidden, Setting
 from structure.gages import GAGES
 from structure.rig import shown_by_gages
 from tirelib.campaign import TireGeometry
-from tirelib.rolling.constants import Constants
-from tirelib.rolling.gage import Gage
-from tirelib.rolling.solve import solve
+from tirelib.physics.rolling.constants import Constants
+from tirelib.physics.rolling.gage import Gage
+from tirelib.physics.rolling.solve import solve
 
 BAR = 1e5
 NUDGE = 10.0

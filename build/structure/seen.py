@@ -16,8 +16,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from structure.learn import FAMILIES, OUT, TABLE, kept_fit, say
 from structure.make import seeds
 from tirelib.core.threads import one_thread
-from tirelib.infer.hypothesis import judged
-from tirelib.infer.plain import load
+from tirelib.inference.statistics.hypothesis import judged
+from tirelib.inference.statistics.plain import load
 
 LEVEL = 0.05
 

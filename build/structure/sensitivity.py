@@ -2,10 +2,11 @@
 
     python build/structure/sensitivity.py --family rig --seeds 101-170
 
-For every number of `tirelib.infer` that decides, as it is, halved and doubled: how many plain tires
-of each family are rejected by the other families at 5 %, and how many campaigns of a family with
-something hidden are rejected by all families, of these by their own effect. Reads the campaigns of
-`build/structure/make.py`, the fits of `build/structure/learn.py`, and the library's table.
+For every number of `tirelib.inference.statistics` that decides, as it is, halved and doubled: how
+many plain tires of each family are rejected by the other families at 5 %, and how many campaigns of
+a family with something hidden are rejected by all families, of these by their own effect. Reads the
+campaigns of `build/structure/make.py`, the fits of `build/structure/learn.py`, and the library's
+table.
 """
 
 import argparse
@@ -23,9 +24,9 @@ from structure.cases import NONE
 from structure.learn import FAMILIES, OUT, TABLE, Fit, fits_of, kept_fit, say
 from structure.make import seeds
 from tirelib.core.threads import one_thread
-from tirelib.infer import hypothesis, null, plain
-from tirelib.infer.hypothesis import judged
-from tirelib.infer.plain import Family, load
+from tirelib.inference.statistics import hypothesis, null, plain
+from tirelib.inference.statistics.hypothesis import judged
+from tirelib.inference.statistics.plain import Family, load
 
 LEVEL = 0.05
 LARGEST = 1.3
@@ -35,7 +36,7 @@ NUMBERS = ("PRIOR", "MORE", "SIZES", "SIZE_STD", "OWN", "OPPOSITE", "EVEN")
 
 @contextmanager
 def scaled(name: str, factor: float) -> Iterator[None]:
-    """Change a number of `tirelib.infer` for a while, wherever it has been imported."""
+    """Change a number of `tirelib.inference.statistics` for a while, wherever it is imported."""
     places = [module for module in (null, hypothesis, plain) if hasattr(module, name)]
     old = getattr(places[0], name)
     new: Any = tuple(factor * np.array(old)) if isinstance(old, tuple) else factor * old

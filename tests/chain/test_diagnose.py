@@ -65,8 +65,8 @@ def test_the_named_effect_is_added_and_no_longer_a_candidate(
     model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     use(monkeypatch, waves(EFFECT, STRENGTH))
-    monkeypatch.setattr("tirelib.extend.additions.extended", lambda *_: added()[0])
-    monkeypatch.setattr("tirelib.extend.additions.strain_models", lambda *_: None)
+    monkeypatch.setattr("tirelib.inference.extend.additions.extended", lambda *_: added()[0])
+    monkeypatch.setattr("tirelib.inference.extend.additions.strain_models", lambda *_: None)
     second, target = tmp_path / "M2.toml", tmp_path / "A.json"
     found = call(
         "add", EFFECT, "--model", model, "--data", "anywhere", "--out", second, "--json", target

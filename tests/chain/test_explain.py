@@ -65,7 +65,7 @@ def strain(tmp_path_factory: pytest.TempPathFactory) -> Any:
     with pytest.MonkeyPatch.context() as patch:
         for verb in ("compare", "diagnose", "add", "explain"):
             patch.setattr(f"tirelib.cli.{verb}.read_campaign", lambda path: Folder(measured))
-        for module in (waveforms, sys.modules["tirelib.compare.compare"]):
+        for module in (waveforms, sys.modules["tirelib.inference.compare.compare"]):
             patch.setattr(
                 module, "measure_waveforms", lambda campaign, progress=None: campaign.measured
             )

@@ -297,7 +297,7 @@ def test_a_tire_that_is_not_there_is_an_error_of_two(
 def test_a_tire_may_be_given_as_start_and_nothing_identified_is_one(
     campaign: Path, document: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tirelib.identify.identify.WIDEST", 1e-6)
+    monkeypatch.setattr("tirelib.inference.identify.identify.WIDEST", 1e-6)
     out = tmp_path / "M.toml"
     found = CliRunner().invoke(
         program, ["identify", str(campaign), "--tire", "table-6-1", "--out", str(out)]

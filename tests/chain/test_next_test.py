@@ -31,7 +31,7 @@ def campaign(monkeypatch: pytest.MonkeyPatch) -> None:
 def use(patch: pytest.MonkeyPatch, measured: Waveforms) -> None:
     for verb in ("compare", "next_test", "selftest"):
         patch.setattr(f"tirelib.cli.{verb}.read_campaign", lambda path: Folder(measured))
-    for module in (waveforms, sys.modules["tirelib.compare.compare"]):
+    for module in (waveforms, sys.modules["tirelib.inference.compare.compare"]):
         patch.setattr(module, "measure_waveforms", lambda c, progress: c.measured)
 
 

@@ -16,8 +16,8 @@ from click.testing import CliRunner
 from tests.chain.test_command_line import run
 from tests.unit.diagnose.planted import model_file, waves
 from tirelib.cli import main, program
-from tirelib.compare.model import model_of, predict_runs
 from tirelib.core.parameters import read_tire, write_tire
+from tirelib.inference.compare.model import model_of, predict_runs
 from tirelib.model.base import operating_points
 
 

@@ -7,10 +7,10 @@ import pytest
 from hidden.cases import load_case
 
 from tirelib.campaign import read_campaign
-from tirelib.diagnose.diagnose import Diagnosis, diagnose
 from tirelib.effects import CATALOGUE
-from tirelib.identify.campaign_data import StraightRuns, straight_runs
-from tirelib.identify.identify import estimated
+from tirelib.inference.diagnose.diagnose import Diagnosis, diagnose
+from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.inference.identify.identify import estimated
 from tirelib.measured.waveforms import measure_waveforms
 
 DATA = Path(__file__).parent / "data"

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from hidden.cases import Case, load_case
 
-from tirelib.diagnose.diagnose import Diagnosis, diagnose
 from tirelib.effects import CATALOGUE
-from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.identify import estimated
+from tirelib.inference.diagnose.diagnose import Diagnosis, diagnose
+from tirelib.inference.identify.campaign_data import straight_runs
+from tirelib.inference.identify.identify import estimated
 
 DATA = Path(__file__).parent / "data"
 

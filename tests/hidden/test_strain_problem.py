@@ -9,17 +9,17 @@ from hidden.cases import load_case
 
 from tirelib.core.arrays import FloatArray
 from tirelib.effects import CATALOGUE
-from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.identify import estimated
-from tirelib.identify.literature import literature
-from tirelib.identify.random_effects import scales, tangents
-from tirelib.infer.posterior import posterior
-from tirelib.infer.problem import Point
+from tirelib.inference.identify.campaign_data import straight_runs
+from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.literature import literature
+from tirelib.inference.identify.random_effects import scales, tangents
+from tirelib.inference.problems.strain import StrainProblem
+from tirelib.inference.problems.whiten_strain import Whitener
+from tirelib.inference.statistics.posterior import posterior
+from tirelib.inference.statistics.problem import Point
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import move
-from tirelib.problems.strain import StrainProblem
-from tirelib.problems.whiten_strain import Whitener
 
 CASE = Path(__file__).parent / "data" / "1001-none.npz"
 OWN = 0.001

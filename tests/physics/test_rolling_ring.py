@@ -12,12 +12,12 @@ from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.physics.contact.exact import load_exact
 from tirelib.physics.contact.tread import Tread
 from tirelib.physics.ring.ring import Ring
-from tirelib.rolling import belt, road
-from tirelib.rolling.assemble import Unknowns, changed, matrix, residual
-from tirelib.rolling.constants import Constants
-from tirelib.rolling.gage import Gage
-from tirelib.rolling.mesh import mesh
-from tirelib.rolling.solve import Rolling, _column, solve
+from tirelib.physics.rolling import belt, road
+from tirelib.physics.rolling.assemble import Unknowns, changed, matrix, residual
+from tirelib.physics.rolling.constants import Constants
+from tirelib.physics.rolling.gage import Gage
+from tirelib.physics.rolling.mesh import mesh
+from tirelib.physics.rolling.solve import Rolling, _column, solve
 
 LOADS = np.array([1500.0, 4000.0, 7000.0])
 GAGE = Gage(np.full(3, -0.003), np.zeros(3), np.zeros(3))

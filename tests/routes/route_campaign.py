@@ -9,7 +9,7 @@ from tirelib.campaign import CampaignHeader, Tolerance
 from tirelib.campaign.model import TireGeometry
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import Number, Tire, TireFile, read_tire
-from tirelib.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import CONDITIONS, Waveforms
 from tirelib.model.base import operating_points, predict, values_of

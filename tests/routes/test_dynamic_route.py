@@ -23,8 +23,8 @@ from tests.routes.route_campaign import (
 )
 from tirelib.campaign import read_campaign
 from tirelib.core.errors import CalibrationError, ParameterError
-from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.identify import start_file
+from tirelib.inference.identify.campaign_data import straight_runs
+from tirelib.inference.identify.identify import start_file
 from tirelib.measured.waveforms import measure_waveforms
 from tirelib.model.base import operating_points, values_of
 from tirelib.physics.ring.compliance import compliance

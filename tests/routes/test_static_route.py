@@ -12,7 +12,7 @@ from routes.static_route_problem import StrainProblem
 from tests.routes.route_campaign import SERIES, runs, tire, tire_file
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
-from tirelib.identify.campaign_data import StraightRuns
+from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import operating_points, smoothed

@@ -8,9 +8,9 @@ import pytest
 
 from tests.unit.diagnose.planted import runs
 from tests.unit.identify.model_waves import TIRE
-from tirelib.diagnose.diagnose import diagnose
 from tirelib.effects import CATALOGUE
-from tirelib.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.inference.diagnose.diagnose import diagnose
+from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.model.base import values_of
 
 pytestmark = pytest.mark.speed

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from tests.unit.identify.model_waves import TIRE, made_waves
-from tirelib.identify.campaign_data import StraightRuns, straight_runs
-from tirelib.identify.discrepancy import Discrepancy
-from tirelib.identify.identify import estimated
-from tirelib.identify.waveform_fit import Prior, fit_waveforms
+from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.inference.identify.discrepancy import Discrepancy
+from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.waveform_fit import Prior, fit_waveforms
 from tirelib.measured.signal import LowPass
 from tirelib.model.base import BARE, FREE, values_of
 from tirelib.model.solution import solved

@@ -8,10 +8,10 @@ from force_tires.learn import FIRST, OUT, families_sha256
 from force_tires.plans import case
 
 from tirelib.core.threads import one_thread
-from tirelib.infer.hypothesis import judged
-from tirelib.infer.null import OWN
-from tirelib.infer.plain import Family, load
-from tirelib.infer.posterior import posterior
+from tirelib.inference.statistics.hypothesis import judged
+from tirelib.inference.statistics.null import OWN
+from tirelib.inference.statistics.plain import Family, load
+from tirelib.inference.statistics.posterior import posterior
 
 
 def at_angles(angles: np.ndarray, load: float, ratio: float = 0.0) -> tuple[Setting, Changes]:

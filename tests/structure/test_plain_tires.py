@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tirelib.diagnose.diagnose import TABLE, plain_tires
+from tirelib.inference.diagnose.diagnose import TABLE, plain_tires
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "plain_tires.json"
 STORED = json.loads(GOLDEN.read_text())

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from build.structure.cases import load_case
-from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.identify import estimated
+from tirelib.inference.identify.campaign_data import straight_runs
+from tirelib.inference.identify.identify import estimated
 
 FILE = Path(__file__).parents[1] / "golden" / "sliding_edge.npz"
 

@@ -10,9 +10,9 @@ from tests.magic_sweep import CAMBERS, PRESSURES, Sweep, magic_sweep
 from tests.synthetic import header
 from tirelib.campaign import Campaign, Run, RunPlan, read_campaign, write_campaign
 from tirelib.core.parameters import Number, TireFile
-from tirelib.identify.brush_fit import fit_brush
-from tirelib.identify.brush_model import stored_number
-from tirelib.identify.force_data import ForceData, force_data
+from tirelib.inference.identify.brush_fit import fit_brush
+from tirelib.inference.identify.brush_model import stored_number
+from tirelib.inference.identify.force_data import ForceData, force_data
 from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
 
 PLAN = Sweep(loads=(700.0, 1700.0, 2900.0), pressures=PRESSURES[::2], cambers=CAMBERS[::2])

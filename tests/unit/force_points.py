@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tirelib.compare.force_model import ForceModel
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.identify.brush_law import Reference
-from tirelib.identify.brush_model import BrushModel
-from tirelib.identify.force_data import ForceData
-from tirelib.identify.force_points import force_points
+from tirelib.inference.compare.force_model import ForceModel
+from tirelib.inference.identify.brush_law import Reference
+from tirelib.inference.identify.brush_model import BrushModel
+from tirelib.inference.identify.force_data import ForceData
+from tirelib.inference.identify.force_points import force_points
+from tirelib.inference.problems.forces import ForceProblem
 from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
-from tirelib.problems.forces import ForceProblem
 
 VALUES = {
     "lateral_stiffness": 8e6,

@@ -14,20 +14,20 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from tests.fmu import live, virtual_host
 from tirelib.campaign import read_campaign
-from tirelib.compare.compare import compare
 from tirelib.core.threads import VARIABLES, one_thread
-from tirelib.diagnose.diagnose import diagnose
-from tirelib.diagnose.forces.diagnose import diagnose_force
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.train import train
-from tirelib.extend.extension import extended
-from tirelib.extend.force_extension import extended_brush
-from tirelib.identify.forces import identify_forces
-from tirelib.identify.identify import identify
-from tirelib.identify.whole import identify_whole
+from tirelib.inference.compare.compare import compare
+from tirelib.inference.diagnose.diagnose import diagnose
+from tirelib.inference.diagnose.forces.diagnose import diagnose_force
+from tirelib.inference.extend.extension import extended
+from tirelib.inference.extend.force_extension import extended_brush
+from tirelib.inference.identify.forces import identify_forces
+from tirelib.inference.identify.identify import identify
+from tirelib.inference.identify.whole import identify_whole
+from tirelib.inference.planning.next_test import next_test
+from tirelib.inference.planning.selftest import selftest
 from tirelib.measured.observations import observe
-from tirelib.planning.next_test import next_test
-from tirelib.planning.selftest import selftest
 from tirelib.report.simulation import simulate
 from tirelib.rig.solve import solve
 

@@ -106,8 +106,8 @@ def add(
 
 def _undo(model_name: str, out: Path, json_file: Path | None) -> None:
     from tirelib.core.parameters import read_tire, write_tire
-    from tirelib.extend.document import FORMAT as EXTENSION
-    from tirelib.extend.model_file import undone_file
+    from tirelib.inference.extend.document import FORMAT as EXTENSION
+    from tirelib.inference.extend.model_file import undone_file
 
     file, entry = undone_file(read_tire(model_name))
     write_tire(file, out, FORMAT)
@@ -141,8 +141,8 @@ def _change(
     json_file: Path | None,
 ) -> None:
     from tirelib.core.parameters import read_tire
-    from tirelib.extend.additions import additions, removal
-    from tirelib.extend.extension import known_effect
+    from tirelib.inference.extend.additions import additions, removal
+    from tirelib.inference.extend.extension import known_effect
     from tirelib.model.registration import registered_effects
 
     catalogue = registered_effects(effect_files)

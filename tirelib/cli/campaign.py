@@ -179,7 +179,7 @@ def show(
 
 def _write_measured(data: Campaign, runs: Iterator[Run], file: Path) -> None:
     """Write what was measured, or say why there is nothing to be drawn."""
-    from tirelib.compare.plot_data import measured_data, write_plot_data
+    from tirelib.inference.compare.plot_data import measured_data, write_plot_data
 
     try:
         write_plot_data(file, measured_data(data, runs))

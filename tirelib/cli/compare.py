@@ -18,7 +18,7 @@ from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.core.errors import ParameterError
 
 if TYPE_CHECKING:
-    from tirelib.compare import Comparison, ForceComparison
+    from tirelib.inference.compare import Comparison, ForceComparison
 
 _EXAMPLE = """\b
 Examples:
@@ -78,8 +78,8 @@ def compare(
     json_file: Path | None,
 ) -> None:
     """Compare a model with CAMPAIGN and show where it fails."""
-    from tirelib.compare import compare as compare_model
     from tirelib.core.parameters import read_tire
+    from tirelib.inference.compare import compare as compare_model
     from tirelib.model.registration import registered_effects
 
     catalogue = registered_effects(effect_files)
@@ -91,7 +91,7 @@ def compare(
     with progress_bar("comparing") as progress:
         found = compare_model(campaign, file, quantity, effects=catalogue, progress=progress)
         if data_file is not None:
-            from tirelib.compare.plot_data import plot_data, write_plot_data
+            from tirelib.inference.compare.plot_data import plot_data, write_plot_data
 
             data = plot_data(found, campaign, file, planted, catalogue, progress=progress)
     write_told(found, out, json_file)
@@ -104,7 +104,7 @@ def write_told(
     found: "Comparison | ForceComparison", out: Path | None, json_file: Path | None
 ) -> dict[str, Any]:
     """Say a comparison, write its page and its numbers, and return these."""
-    from tirelib.compare.document import comparison_document
+    from tirelib.inference.compare.document import comparison_document
 
     document = comparison_document(found)
     console = output()

@@ -29,9 +29,9 @@ from tirelib.core.errors import TirelibError
 
 if TYPE_CHECKING:
     from tirelib.core.parameters import TireFile
-    from tirelib.diagnose.document import Assessment
-    from tirelib.diagnose.forces.assess import ForceAssessment
     from tirelib.effects import Effect
+    from tirelib.inference.diagnose.document import Assessment
+    from tirelib.inference.diagnose.forces.assess import ForceAssessment
 
 _EXAMPLE = """\b
 Examples:
@@ -119,10 +119,10 @@ def diagnosed(
     progress: Callable[[str], None],
 ) -> tuple["Assessment | ForceAssessment", dict[str, Any]]:
     """Return a diagnosis, and its document with the run that distinguishes what it cannot."""
-    from tirelib.diagnose.document import Assessment, diagnosis_document
-    from tirelib.diagnose.forces.document import force_diagnosis_document
+    from tirelib.inference.diagnose.document import Assessment, diagnosis_document
+    from tirelib.inference.diagnose.forces.document import force_diagnosis_document
+    from tirelib.inference.planning.document import next_test_document
     from tirelib.journey import diagnose as diagnose_model
-    from tirelib.planning.document import next_test_document
 
     told = diagnose_model(
         campaign, file, quantity, effects=catalogue, false_alarm=false_alarm, progress=progress

@@ -27,9 +27,9 @@ from tirelib.journey import QUANTITIES, explains_forces
 
 if TYPE_CHECKING:
     from tirelib.core.parameters import TireFile
-    from tirelib.diagnose.document import Assessment
-    from tirelib.diagnose.forces.assess import ForceAssessment
     from tirelib.effects import Effect
+    from tirelib.inference.diagnose.document import Assessment
+    from tirelib.inference.diagnose.forces.assess import ForceAssessment
     from tirelib.report.journey import Journey
 
 FORMAT = "tirelib-explanation/1"
@@ -178,7 +178,7 @@ class Steps:
     def _diagnosed(
         self, file: "TireFile", model: str, quantity: str | None, about: tuple[str, ...]
     ) -> tuple["Assessment | ForceAssessment", dict[str, Any]]:
-        from tirelib.diagnose.diagnose import FALSE_ALARM
+        from tirelib.inference.diagnose.diagnose import FALSE_ALARM
 
         page = self.out / "diagnosed"
         words = (str(self.folder), "--model", model, *about, *self.effects)
@@ -221,7 +221,7 @@ class Steps:
 
     def _settled(self, file: "TireFile", quantity: str | None) -> str | None:
         """Return the quantity; of forces it is settled once for all steps."""
-        from tirelib.diagnose.forces.assess import force_case
+        from tirelib.inference.diagnose.forces.assess import force_case
 
         if not explains_forces(quantity, self.campaign, file):
             return quantity
@@ -238,7 +238,7 @@ class Steps:
 
         An effect that cannot be added is left out, with a message.
         """
-        from tirelib.extend.additions import additions
+        from tirelib.inference.extend.additions import additions
 
         def failed(effect: "Effect", error: TirelibError) -> None:
             self.messages.append(f"{effect.name} is named but could not be added: {error}")

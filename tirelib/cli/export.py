@@ -80,9 +80,9 @@ def export(
 ) -> None:
     """Fit a Magic Formula 6.1 to a model's brush or to a force campaign, and write it as .tir."""
     from tirelib.campaign import read_campaign
-    from tirelib.compare.force_model import force_model_of
-    from tirelib.compare.magic_points import campaign_points, model_points
     from tirelib.core.parameters import read_tire
+    from tirelib.inference.compare.force_model import force_model_of
+    from tirelib.inference.compare.magic_points import campaign_points, model_points
     from tirelib.model.registration import registered_effects
     from tirelib.physics.brush.mf_file import tir_of, words
     from tirelib.physics.brush.mf_fit import fit_magic

@@ -17,7 +17,7 @@ from tirelib.cli.progress import is_verbose, progress_bar, progress_options
 
 if TYPE_CHECKING:
     from tirelib.core.parameters import TireFile
-    from tirelib.identify.whole import Whole
+    from tirelib.inference.identify.whole import Whole
 
 BASES = ("plain", "dissertation")
 GIVES_WAY = 10
@@ -86,8 +86,8 @@ def identify(
 ) -> None:
     """Fit the base model, ring and brush, to DIR."""
     from tirelib.core.parameters import read_tire, write_tire
-    from tirelib.identify.forces_document import whole_document
-    from tirelib.identify.whole import identify_whole
+    from tirelib.inference.identify.forces_document import whole_document
+    from tirelib.inference.identify.whole import identify_whole
 
     start = read_tire(tire_file) if tire_file is not None else None
     campaign = read_campaign(folder)
@@ -134,9 +134,9 @@ def identify(
 
 def _errors(campaign: Campaign, whole: "Whole") -> dict[str, Any]:
     """Return the errors of the identified model, computed as in every other command."""
-    from tirelib.compare.error import error_of
-    from tirelib.compare.forces import compare_forces
-    from tirelib.compare.model import model_of
+    from tirelib.inference.compare.error import error_of
+    from tirelib.inference.compare.forces import compare_forces
+    from tirelib.inference.compare.model import model_of
 
     told: dict[str, Any] = {}
     if whole.ring is not None:

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from tirelib.campaign import Campaign
     from tirelib.core.parameters import TireFile
     from tirelib.effects import Effect
-    from tirelib.planning.document import Plan
-    from tirelib.planning.envelope import Axis, Range
+    from tirelib.inference.planning.document import Plan
+    from tirelib.inference.planning.envelope import Axis, Range
 
 _EXAMPLE = """\b
 Examples:
@@ -132,20 +132,20 @@ def next_test(
     **ranges: tuple[float, float] | None,
 ) -> None:
     """Tell which further run would separate the suspects of CAMPAIGN best."""
-    from tirelib.compare.error import error_of
-    from tirelib.compare.model import model_of
     from tirelib.core.parameters import read_tire
-    from tirelib.diagnose.diagnose import diagnose, plain_tires
-    from tirelib.diagnose.document import assess, diagnosis_document
-    from tirelib.identify.campaign_data import straight_runs
-    from tirelib.infer.select import Hypotheses
+    from tirelib.inference.compare.error import error_of
+    from tirelib.inference.compare.model import model_of
+    from tirelib.inference.diagnose.diagnose import diagnose, plain_tires
+    from tirelib.inference.diagnose.document import assess, diagnosis_document
+    from tirelib.inference.identify.campaign_data import straight_runs
+    from tirelib.inference.planning.document import plan_document, plan_test
+    from tirelib.inference.planning.envelope import Envelope
+    from tirelib.inference.planning.suspects import given_suspects, suspects_of
+    from tirelib.inference.problems.strain import StrainProblem
+    from tirelib.inference.problems.strain_living import in_base
+    from tirelib.inference.statistics.select import Hypotheses
     from tirelib.measured.waveforms import measure_waveforms
     from tirelib.model.registration import registered_effects
-    from tirelib.planning.document import plan_document, plan_test
-    from tirelib.planning.envelope import Envelope
-    from tirelib.planning.suspects import given_suspects, suspects_of
-    from tirelib.problems.strain import StrainProblem
-    from tirelib.problems.strain_living import in_base
 
     if diagnosis_file is not None and names is not None:
         raise ParameterError("--diagnosis and --suspects are both given; give one of them")
@@ -236,10 +236,10 @@ def _for_force(
     sweep: bool | None,
 ) -> tuple[dict[str, Any], "Plan"]:
     """Return the next test of a force, as a document and as a plan."""
-    from tirelib.diagnose.forces.assess import force_case
-    from tirelib.planning.document import plan_document, plan_force_test
-    from tirelib.planning.force_runs import force_envelope
-    from tirelib.planning.suspects import given_suspects, suspects_of
+    from tirelib.inference.diagnose.forces.assess import force_case
+    from tirelib.inference.planning.document import plan_document, plan_force_test
+    from tirelib.inference.planning.force_runs import force_envelope
+    from tirelib.inference.planning.suspects import given_suspects, suspects_of
 
     told: dict[str, Any] | None = None
     with progress_bar("planning") as progress:
@@ -360,7 +360,7 @@ def _condition(entry: dict[str, Any], axis: "Axis") -> str:
 
 
 def _say(document: dict[str, Any]) -> None:
-    from tirelib.planning.envelope import AXES
+    from tirelib.inference.planning.envelope import AXES
 
     console = output()
     console.print(f"{document['campaign']}, {document['quantity']}: {document['why']}")

@@ -81,14 +81,14 @@ def selftest(
     json_file: Path | None,
 ) -> None:
     """Plant each effect at the plan and noise of CAMPAIGN and count how often it is found."""
-    from tirelib.compare.error import error_of
-    from tirelib.compare.model import model_of
     from tirelib.core.parameters import read_tire
-    from tirelib.identify.campaign_data import straight_runs
+    from tirelib.inference.compare.error import error_of
+    from tirelib.inference.compare.model import model_of
+    from tirelib.inference.identify.campaign_data import straight_runs
+    from tirelib.inference.planning.selftest import selftest as test_plan
+    from tirelib.inference.planning.selftest_document import selftest_document
     from tirelib.measured.waveforms import measure_waveforms
     from tirelib.model.registration import registered_effects
-    from tirelib.planning.selftest import selftest as test_plan
-    from tirelib.planning.selftest_document import selftest_document
 
     catalogue = registered_effects(effect_files)
     model = model_of(read_tire(model_name), catalogue)

@@ -12,11 +12,11 @@ from rich.table import Table
 
 from tirelib.cli.common import NEW_FOLDER, output, write_json
 from tirelib.cli.options import effects_option, json_option
-from tirelib.compare.model import Model, UsedEffect, model_of
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.core.parameters import Tire, TireFile, read_tire
 from tirelib.core.units import from_si, to_si
+from tirelib.inference.compare.model import Model, UsedEffect, model_of
 from tirelib.model.registration import registered_effects
 from tirelib.report.simulation import (
     CONTACTS,

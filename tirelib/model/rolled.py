@@ -7,10 +7,10 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.model.state import Operating
-from tirelib.rolling.assemble import Unknowns, by_element, changed, differ, fields
-from tirelib.rolling.constants import Constants
-from tirelib.rolling.gage import Gage, same_place, strain, strain_along
-from tirelib.rolling.solve import Rolling, slopes
+from tirelib.physics.rolling.assemble import Unknowns, by_element, changed, differ, fields
+from tirelib.physics.rolling.constants import Constants
+from tirelib.physics.rolling.gage import Gage, same_place, strain, strain_along
+from tirelib.physics.rolling.solve import Rolling, slopes
 
 STEP = 1e-6
 """Relative change of what the ring is made of, of which the residual's slope is taken."""

@@ -24,7 +24,7 @@ from tirelib.model.solution import (
     split,
 )
 from tirelib.model.state import READ, Operating, State
-from tirelib.rolling.assemble import Unknowns
+from tirelib.physics.rolling.assemble import Unknowns
 
 SMALL = 1e-4
 """Change of a waveform, over its largest value, by which a gage is differentiated. On a campaign of

@@ -32,10 +32,10 @@ from tirelib.model.chain import (
 from tirelib.model.rolled import Made, made_of
 from tirelib.model.state import Operating, State
 from tirelib.physics.contact.free_boundary import Start
-from tirelib.rolling.assemble import Unknowns
-from tirelib.rolling.constants import STIFFEST, Constants
-from tirelib.rolling.gage import Gage
-from tirelib.rolling.solve import Rolling, solve
+from tirelib.physics.rolling.assemble import Unknowns
+from tirelib.physics.rolling.constants import STIFFEST, Constants
+from tirelib.physics.rolling.gage import Gage
+from tirelib.physics.rolling.solve import Rolling, solve
 
 Values = Mapping[str, float | FloatArray]
 SAME = (

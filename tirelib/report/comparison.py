@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from tirelib.compare.force_curves import curves_of
-from tirelib.compare.forces import UNITS as FORCE_UNITS
-from tirelib.compare.forces import ForceComparison
-from tirelib.compare.sentences import millimetres
-from tirelib.compare.strain import Comparison
+from tirelib.inference.compare.force_curves import curves_of
+from tirelib.inference.compare.forces import UNITS as FORCE_UNITS
+from tirelib.inference.compare.forces import ForceComparison
+from tirelib.inference.compare.sentences import millimetres
+from tirelib.inference.compare.strain import Comparison
 from tirelib.report.comparison_tables import (
     force_tables,
     gage_tables,

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from tirelib.compare.force_curves import Curve
-from tirelib.compare.forces import UNITS as FORCE_UNITS
-from tirelib.compare.forces import ForceComparison, range_of
-from tirelib.compare.sectors import SECTORS, Cell
-from tirelib.compare.sentences import millimetres, told
-from tirelib.compare.set_points import NAMES
-from tirelib.compare.strain import Comparison
-from tirelib.compare.track_words import track_fit
+from tirelib.inference.compare.force_curves import Curve
+from tirelib.inference.compare.forces import UNITS as FORCE_UNITS
+from tirelib.inference.compare.forces import ForceComparison, range_of
+from tirelib.inference.compare.sectors import SECTORS, Cell
+from tirelib.inference.compare.sentences import millimetres, told
+from tirelib.inference.compare.set_points import NAMES
+from tirelib.inference.compare.strain import Comparison
+from tirelib.inference.compare.track_words import track_fit
 from tirelib.report.figures.compare_heat import NAMES as CONDITIONS
 from tirelib.report.figures.compare_heat import unit_of
 from tirelib.report.page import Table, number

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from tirelib.diagnose.document import Assessment
-from tirelib.diagnose.forces.assess import ForceAssessment
+from tirelib.inference.diagnose.document import Assessment
+from tirelib.inference.diagnose.forces.assess import ForceAssessment
 from tirelib.report.comparison import BRUSH, METHOD, RING
 from tirelib.report.error_sentences import fold_name
 from tirelib.report.explanation import titled

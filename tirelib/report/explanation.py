@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.diagnose.told import listed
-from tirelib.infer.plain import ROUGHLY
+from tirelib.inference.diagnose.told import listed
+from tirelib.inference.statistics.plain import ROUGHLY
 from tirelib.report.error_sentences import error_line, is_known, said_error
 from tirelib.report.page import number
 

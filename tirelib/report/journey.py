@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tirelib.compare.forces import ForceComparison
-from tirelib.compare.strain import Comparison
+from tirelib.inference.compare.forces import ForceComparison
+from tirelib.inference.compare.strain import Comparison
 from tirelib.report.error_sentences import fold_name
 from tirelib.report.explanation import titled
 from tirelib.report.figures.before_after import (

@@ -8,9 +8,9 @@ from plotly.subplots import make_subplots
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.quantities import QUANTITIES
-from tirelib.planning.criterion import NOTHING, NextTest, PairForecast
-from tirelib.planning.document import PROMISING, STRUCTURE, Plan, advice, plan_document
-from tirelib.planning.envelope import AXES
+from tirelib.inference.planning.criterion import NOTHING, NextTest, PairForecast
+from tirelib.inference.planning.document import PROMISING, STRUCTURE, Plan, advice, plan_document
+from tirelib.inference.planning.envelope import AXES
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import Table, number, numbers
 from tirelib.report.parts_page import Part, write_parts_page

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.compare.model import Model
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.core.parameters import FIELDS, Tire
 from tirelib.core.threads import one_thread
+from tirelib.inference.compare.model import Model
 from tirelib.measured.signal import LowPass
 from tirelib.model.base import predict
 from tirelib.model.solution import Solution, solved

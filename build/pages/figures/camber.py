@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tirelib.compare.sentences import millimetres
 from tirelib.estimators.dissertation import Means
+from tirelib.inference.compare.sentences import millimetres
 from tirelib.report.figures.lateral_force import CAMBERS
 from tirelib.report.levels import camber_levels
 from tirelib.report.style import MARKERS, label, legend_below, new_figure, styled

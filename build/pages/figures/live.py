@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pages.figures.strain import ANGLE, STRAIN
-from tirelib.compare.sentences import millimetres
 from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.inference.compare.sentences import millimetres
 from tirelib.report.accuracy import QUANTITIES, SIGNED, TITLE, UNIT, WIDTH
 from tirelib.report.style import (
     BLACK,

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pages.turns import TypicalTurns
-from tirelib.compare.sentences import millimetres
+from tirelib.inference.compare.sentences import millimetres
 from tirelib.report.style import (
     BLACK,
     BLUE,

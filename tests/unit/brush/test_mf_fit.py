@@ -17,10 +17,10 @@ from click.testing import CliRunner
 from tests.unit.brush.test_mf import PLAIN
 from tests.unit.force_campaigns import steady_runs, write_forces
 from tirelib.cli import program
-from tirelib.compare.force_model import force_model_of
-from tirelib.compare.magic_points import model_points
 from tirelib.core.errors import CalibrationError, TirelibError
 from tirelib.core.parameters import Number, TireFile, write_tire
+from tirelib.inference.compare.force_model import force_model_of
+from tirelib.inference.compare.magic_points import model_points
 from tirelib.physics.brush.mf import magic_forces
 from tirelib.physics.brush.mf_fit import STAGES, MagicFit, MagicPoints, _Fit, fit_magic
 from tirelib.physics.brush.mf_tire import Coefficients, MagicTire, magic_tire

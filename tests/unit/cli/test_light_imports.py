@@ -82,26 +82,6 @@ def test_an_unknown_name_is_refused() -> None:
         _ = tirelib.tyre  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize(
-    "first", ["", "import tirelib.compare.model, tirelib.identify.whole, tirelib.diagnose.fitted"]
-)
-def test_a_verb_may_be_called_whatever_was_imported_before(first: str) -> None:
-    code = f"""{first}
-import tirelib
-for verb in (tirelib.identify, tirelib.compare, tirelib.diagnose):
-    try:
-        verb()
-    except TypeError as error:
-        assert "missing" in str(error) and "'campaign'" in str(error), error
-    else:
-        raise AssertionError(verb)
-from tirelib import compare
-import tirelib.compare.model as module
-assert module.__name__ == "tirelib.compare.model" and callable(compare)
-"""
-    imported(code)
-
-
 def test_a_user_s_call_and_the_command_line_agree(tmp_path: Path) -> None:
     from click.testing import CliRunner
 

@@ -8,7 +8,7 @@ import numpy as np
 from tests.synthetic import header
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import TireFile, read_tire
-from tirelib.identify.random_effects import angle_slope
+from tirelib.inference.identify.random_effects import angle_slope
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import CONDITIONS, GRID, Waveforms
 from tirelib.model.base import Operating, smoothed, values_of

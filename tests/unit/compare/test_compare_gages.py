@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.unit.compare.compare_synthetic import bump, model_file, waveforms
-from tirelib.compare.document import comparison_document
-from tirelib.compare.model import model_of
-from tirelib.compare.strain import Comparison, compare_strain
+from tirelib.inference.compare.document import comparison_document
+from tirelib.inference.compare.model import model_of
+from tirelib.inference.compare.strain import Comparison, compare_strain
 from tirelib.measured.waveforms import GRID, Waveforms
 from tirelib.report.comparison import strain_parts
 

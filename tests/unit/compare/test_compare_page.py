@@ -14,9 +14,9 @@ import pytest
 
 from tests.unit.compare.compare_synthetic import bump, model_file, plan, waveforms
 from tirelib.cli.common import plain
-from tirelib.compare.document import comparison_document
-from tirelib.compare.model import model_of
-from tirelib.compare.strain import Comparison, compare_strain
+from tirelib.inference.compare.document import comparison_document
+from tirelib.inference.compare.model import model_of
+from tirelib.inference.compare.strain import Comparison, compare_strain
 from tirelib.report.comparison import strain_parts, write_comparison
 
 KEYS = {

@@ -9,12 +9,12 @@ import pytest
 from tests.synthetic import waveform
 from tests.unit.compare.compare_synthetic import bump, model_file, waveforms
 from tirelib.campaign import Tolerance
-from tirelib.compare.model import model_of
-from tirelib.compare.set_points import predict_set_points
-from tirelib.compare.strain import compare_strain
-from tirelib.compare.tracks import contact_angle, pooled
-from tirelib.identify.noise import RepeatNoise
-from tirelib.identify.random_effects import scales
+from tirelib.inference.compare.model import model_of
+from tirelib.inference.compare.set_points import predict_set_points
+from tirelib.inference.compare.strain import compare_strain
+from tirelib.inference.compare.tracks import contact_angle, pooled
+from tirelib.inference.identify.noise import RepeatNoise
+from tirelib.inference.identify.random_effects import scales
 from tirelib.measured.waveforms import GRID
 
 MODEL = model_of(model_file())

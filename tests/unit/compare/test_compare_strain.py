@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.unit.compare.compare_synthetic import bump, model_file, plan, waveforms
-from tirelib.compare.model import model_of
-from tirelib.compare.regions import find_regions
-from tirelib.compare.sectors import SECTORS, sectors_of
-from tirelib.compare.strain import Comparison, compare_strain
 from tirelib.core.errors import CalibrationError, FormatError
 from tirelib.core.parameters import Number, TireFile
+from tirelib.inference.compare.model import model_of
+from tirelib.inference.compare.regions import find_regions
+from tirelib.inference.compare.sectors import SECTORS, sectors_of
+from tirelib.inference.compare.strain import Comparison, compare_strain
 from tirelib.measured.waveforms import GRID, Waveforms
 
 MODEL = model_of(model_file())

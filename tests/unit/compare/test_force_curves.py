@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tirelib.compare.document import comparison_document
-from tirelib.compare.floor import last_floor
-from tirelib.compare.force_curves import curves_of, ranked
-from tirelib.compare.forces import ForceComparison
-from tirelib.identify.force_data import ForceData
+from tirelib.inference.compare.document import comparison_document
+from tirelib.inference.compare.floor import last_floor
+from tirelib.inference.compare.force_curves import curves_of, ranked
+from tirelib.inference.compare.forces import ForceComparison
+from tirelib.inference.identify.force_data import ForceData
 from tirelib.report.comparison import force_parts
 
 ANGLES = np.deg2rad([-4.0, -2.0, 0.0, 2.0, 4.0])

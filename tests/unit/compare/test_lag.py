@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tests.unit.compare.compare_synthetic import model_file, waveforms
-from tirelib.compare.lag import fitted_delay
-from tirelib.compare.model import model_of
-from tirelib.compare.strain import Comparison, compare_strain
 from tirelib.core.arrays import FloatArray
-from tirelib.identify.delay import STD, earlier
-from tirelib.identify.random_effects import Whitening
+from tirelib.inference.compare.lag import fitted_delay
+from tirelib.inference.compare.model import model_of
+from tirelib.inference.compare.strain import Comparison, compare_strain
+from tirelib.inference.identify.delay import STD, earlier
+from tirelib.inference.identify.random_effects import Whitening
 from tirelib.measured.waveforms import GRID
 
 

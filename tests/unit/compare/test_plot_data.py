@@ -13,14 +13,14 @@ from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
 from tests.unit.force_campaigns import brush_file, steady_runs, write_forces
 from tests.unit.identify.model_waves import TIRE
 from tirelib.campaign import Campaign, Run, read_campaign
-from tirelib.compare.forces import compare_forces
-from tirelib.compare.model import model_of
-from tirelib.compare.plot_data import measured_data, plot_data, write_plot_data
-from tirelib.compare.strain import compare_strain
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import Number
 from tirelib.effects import CATALOGUE
-from tirelib.identify.delay import by_delay
+from tirelib.inference.compare.forces import compare_forces
+from tirelib.inference.compare.model import model_of
+from tirelib.inference.compare.plot_data import measured_data, plot_data, write_plot_data
+from tirelib.inference.compare.strain import compare_strain
+from tirelib.inference.identify.delay import by_delay
 from tirelib.measured.waveforms import measure_waveforms
 from tirelib.model.base import coordinates, operating_points
 from tirelib.model.slopes import by_values

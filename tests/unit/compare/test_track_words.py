@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.unit.compare.compare_synthetic import ANGLE, model_file, waveforms
-from tirelib.compare.model import model_of
-from tirelib.compare.runs import Factor
-from tirelib.compare.strain import compare_strain
-from tirelib.compare.track_words import track_fit, track_sentences
-from tirelib.compare.tracks import Track, contact_edges, pooled
+from tirelib.inference.compare.model import model_of
+from tirelib.inference.compare.runs import Factor
+from tirelib.inference.compare.strain import compare_strain
+from tirelib.inference.compare.track_words import track_fit, track_sentences
+from tirelib.inference.compare.tracks import Track, contact_edges, pooled
 from tirelib.measured.waveforms import GRID
 
 LOADS = np.repeat([1500.0, 3000.0, 4500.0, 6000.0], 6)

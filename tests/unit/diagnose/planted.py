@@ -6,13 +6,13 @@ import numpy as np
 
 from tests.synthetic import LATERAL
 from tests.unit.identify.model_waves import TIRE, made_waves
-from tirelib.compare.model import Model, model_of
 from tirelib.core.parameters import Number, TireFile
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.effects.effect import Strength
-from tirelib.extend.extension import Extension, extended, refuse, strain_models
-from tirelib.extend.model_file import extended_file
-from tirelib.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.inference.compare.model import Model, model_of
+from tirelib.inference.extend.extension import Extension, extended, refuse, strain_models
+from tirelib.inference.extend.model_file import extended_file
+from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.measured.waveforms import Waveforms
 from tirelib.model.base import operating_points, values_of
 from tirelib.model.solution import solved

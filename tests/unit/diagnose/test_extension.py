@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, add_effect, added, model_file, runs
-from tirelib.compare.error import error_of
-from tirelib.compare.model import model_of
 from tirelib.core.errors import CalibrationError, FormatError, ParameterError
 from tirelib.core.parameters import read_tire, write_tire
 from tirelib.effects import CATALOGUE
-from tirelib.extend.document import extension_document
-from tirelib.extend.extension import known_effect, remove_effect
-from tirelib.extend.model_file import extended_file, undone_file
+from tirelib.inference.compare.error import error_of
+from tirelib.inference.compare.model import model_of
+from tirelib.inference.extend.document import extension_document
+from tirelib.inference.extend.extension import known_effect, remove_effect
+from tirelib.inference.extend.model_file import extended_file, undone_file
 
 
 def test_adding_the_planted_effect_takes_the_error_away() -> None:

@@ -10,22 +10,22 @@ from scipy import optimize
 
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, runs
 from tests.unit.identify.model_waves import TIRE
-from tirelib.compare.error import Yardstick, error_of
-from tirelib.compare.model import model_of
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
-from tirelib.diagnose.diagnose import plain_tires
-from tirelib.diagnose.fitted import Fitted, fitted, least_error
 from tirelib.effects import CATALOGUE
 from tirelib.effects.effect import Effect, effect
-from tirelib.identify.campaign_data import StraightRuns
-from tirelib.identify.delay import UNIT, by_delay, earlier, late
-from tirelib.infer.posterior import Posterior, posterior
-from tirelib.infer.select import Hypotheses
+from tirelib.inference.compare.error import Yardstick, error_of
+from tirelib.inference.compare.model import model_of
+from tirelib.inference.diagnose.diagnose import plain_tires
+from tirelib.inference.diagnose.fitted import Fitted, fitted, least_error
+from tirelib.inference.identify.campaign_data import StraightRuns
+from tirelib.inference.identify.delay import UNIT, by_delay, earlier, late
+from tirelib.inference.problems.strain import WIDTH, StrainProblem
+from tirelib.inference.statistics.posterior import Posterior, posterior
+from tirelib.inference.statistics.select import Hypotheses
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import BARE, move, values_of
 from tirelib.model.state import State
-from tirelib.problems.strain import WIDTH, StrainProblem
 
 DELAY = 4e-5
 FIRST_ORDER, SECOND_ORDER = (0.2, 0.02), (0.3, 0.0)
@@ -148,7 +148,7 @@ def test_the_base_is_fitted_once_from_each_start_and_its_whitening_is_about_that
         starts.append(named.get("near"))
         return posterior(problem, *words, **named)
 
-    monkeypatch.setattr("tirelib.infer.select.posterior", counted)
+    monkeypatch.setattr("tirelib.inference.statistics.select.posterior", counted)
     measured, near = runs(), values_of(TIRE)
     given = StrainProblem(measured, {**near, "tread_stiffness": 2.0 * TIRE.tread_stiffness}, ())
     among = Hypotheses(given, plain_tires())

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from tests.unit.force_points import ANGLES, LOADS, MODEL, PRESSURES, VALUES
-from tirelib.diagnose.forces.diagnose import diagnose_force
-from tirelib.diagnose.forces.fit import MeasuredForce, fit_force
-from tirelib.diagnose.forces.held_out import errors_of, force_folds
-from tirelib.diagnose.forces.left import left_of
-from tirelib.diagnose.held_out import Fold, pooled
 from tirelib.effects import CATALOGUE, effect
-from tirelib.identify.force_data import ForceData
-from tirelib.identify.force_points import force_points
+from tirelib.inference.diagnose.forces.diagnose import diagnose_force
+from tirelib.inference.diagnose.forces.fit import MeasuredForce, fit_force
+from tirelib.inference.diagnose.forces.held_out import errors_of, force_folds
+from tirelib.inference.diagnose.forces.left import left_of
+from tirelib.inference.diagnose.held_out import Fold, pooled
+from tirelib.inference.identify.force_data import ForceData
+from tirelib.inference.identify.force_points import force_points
 from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
 
 

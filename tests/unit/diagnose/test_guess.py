@@ -5,7 +5,7 @@ import pytest
 
 from tests.unit.diagnose.planted import runs
 from tirelib.core.arrays import FloatArray
-from tirelib.diagnose.guess import guess_law
+from tirelib.inference.diagnose.guess import guess_law
 from tirelib.measured.waveforms import GRID
 from tirelib.model.state import Operating
 

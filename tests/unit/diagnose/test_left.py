@@ -9,21 +9,21 @@ import pytest
 
 from tests.unit.diagnose.planted import EFFECT, LOADS, model_file, runs
 from tests.unit.identify.model_waves import TIRE
-from tirelib.compare.error import Yardstick, error_of
-from tirelib.compare.model import Model, model_of
 from tirelib.core.arrays import BoolArray
-from tirelib.diagnose.diagnose import plain_tires
-from tirelib.diagnose.document import next_test
-from tirelib.diagnose.fitted import Fitted, fitted
-from tirelib.diagnose.floor import floor_of
-from tirelib.diagnose.held_out import folds, held_out, pooled
-from tirelib.diagnose.left import left_of, told_range
 from tirelib.effects import CATALOGUE
-from tirelib.identify.campaign_data import StraightRuns
-from tirelib.infer.select import Hypotheses
+from tirelib.inference.compare.error import Yardstick, error_of
+from tirelib.inference.compare.model import Model, model_of
+from tirelib.inference.diagnose.diagnose import plain_tires
+from tirelib.inference.diagnose.document import next_test
+from tirelib.inference.diagnose.fitted import Fitted, fitted
+from tirelib.inference.diagnose.floor import floor_of
+from tirelib.inference.diagnose.held_out import folds, held_out, pooled
+from tirelib.inference.diagnose.left import left_of, told_range
+from tirelib.inference.identify.campaign_data import StraightRuns
+from tirelib.inference.problems.strain import StrainProblem
+from tirelib.inference.statistics.select import Hypotheses
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import values_of
-from tirelib.problems.strain import StrainProblem
 
 
 def base_of(measured: StraightRuns) -> Fitted:

@@ -9,15 +9,15 @@ import pytest
 from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, runs
 from tests.unit.force_campaigns import brush_file, write_sweep
 from tirelib.campaign import Campaign, read_campaign
-from tirelib.compare.model import model_of
 from tirelib.core.errors import ParameterError
 from tirelib.core.parameters import TireFile
-from tirelib.diagnose.diagnose import Diagnosis, diagnose
-from tirelib.diagnose.forces.assess import ForceAssessment
 from tirelib.effects import CATALOGUE
-from tirelib.extend.additions import additions
-from tirelib.extend.extension import extended
-from tirelib.infer import select
+from tirelib.inference.compare.model import model_of
+from tirelib.inference.diagnose.diagnose import Diagnosis, diagnose
+from tirelib.inference.diagnose.forces.assess import ForceAssessment
+from tirelib.inference.extend.additions import additions
+from tirelib.inference.extend.extension import extended
+from tirelib.inference.statistics import select
 from tirelib.journey import add
 from tirelib.journey import diagnose as diagnose_model
 

@@ -9,10 +9,10 @@ import pytest
 from tests.unit.force_campaigns import brush_file, steady_runs, write_forces
 from tirelib.core.errors import FormatError, ParameterError
 from tirelib.core.parameters import TireFile, read_tire, write_tire
-from tirelib.diagnose.forces.assess import ForceCase, force_case, force_cases
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.extend.force_document import force_extended_file, force_extension_document
-from tirelib.extend.force_extension import (
+from tirelib.inference.diagnose.forces.assess import ForceCase, force_case, force_cases
+from tirelib.inference.extend.force_document import force_extended_file, force_extension_document
+from tirelib.inference.extend.force_extension import (
     ForceExtension,
     case_for,
     extended_brush,
@@ -20,7 +20,7 @@ from tirelib.extend.force_extension import (
     refuse_brush,
     remove_brush_effect,
 )
-from tirelib.extend.model_file import undone_file
+from tirelib.inference.extend.model_file import undone_file
 from tirelib.journey import add
 from tirelib.report.figures.waterfall import waterfall_of
 

@@ -5,11 +5,11 @@ import pytest
 
 from tests.magic_tires import RATIOS, magic, magic_data
 from tests.unit.identify.test_brush_fit import A0, MU, SMALL, TRUTH, WIDE, C, make
-from tirelib.identify.brush_advice import NO_RUN, advice
-from tirelib.identify.brush_estimates import estimates_of, slip_stiffness
-from tirelib.identify.brush_fit import fit_brush
-from tirelib.identify.brush_study import Study, study_of
-from tirelib.identify.force_data import ForceData
+from tirelib.inference.identify.brush_advice import NO_RUN, advice
+from tirelib.inference.identify.brush_estimates import estimates_of, slip_stiffness
+from tirelib.inference.identify.brush_fit import fit_brush
+from tirelib.inference.identify.brush_study import Study, study_of
+from tirelib.inference.identify.force_data import ForceData
 from tirelib.physics.brush.mf import magic_forces
 from tirelib.physics.brush.mf_tire import MagicTire
 

@@ -18,11 +18,11 @@ from tirelib.campaign import (
 from tirelib.campaign.importing import import_campaign
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import read_tire
-from tirelib.identify.brush_fit import BrushFit, fit_brush
-from tirelib.identify.brush_study import stiffness_at
-from tirelib.identify.error_bands import band_errors, bands, levels
-from tirelib.identify.force_data import ForceData, force_data
-from tirelib.identify.ring_patch import half_lengths, ring_contact
+from tirelib.inference.identify.brush_fit import BrushFit, fit_brush
+from tirelib.inference.identify.brush_study import stiffness_at
+from tirelib.inference.identify.error_bands import band_errors, bands, levels
+from tirelib.inference.identify.force_data import ForceData, force_data
+from tirelib.inference.identify.ring_patch import half_lengths, ring_contact
 from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
 
 C, MU, A0, N = 8e6, 0.95, 0.062, 0.45

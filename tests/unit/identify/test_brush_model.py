@@ -8,9 +8,9 @@ import pytest
 from tests.unit.identify.test_brush_fit import LOADS, WIDE, make
 from tirelib.core.errors import CalibrationError, FormatError, ParameterError
 from tirelib.core.parameters import NUMBERS, Number, TireFile, read_tire, write_tire
-from tirelib.identify.brush_law import SPECS, Reference, predict
-from tirelib.identify.brush_model import STORED, brush_of, stored_number
-from tirelib.identify.ring_patch import half_lengths
+from tirelib.inference.identify.brush_law import SPECS, Reference, predict
+from tirelib.inference.identify.brush_model import STORED, brush_of, stored_number
+from tirelib.inference.identify.ring_patch import half_lengths
 
 BASE = read_tire("table-6-1")
 DATA = make(WIDE, ratios=(-0.05, 0.0), loads=LOADS[:2], pressures=(1.2e5, 1.4e5))

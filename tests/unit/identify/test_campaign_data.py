@@ -7,7 +7,7 @@ import pytest
 
 from tests.unit.identify.model_waves import LOADS, made_waves
 from tirelib.core.errors import CalibrationError
-from tirelib.identify.campaign_data import STRUCTURE, straight_runs, working_gages
+from tirelib.inference.identify.campaign_data import STRUCTURE, straight_runs, working_gages
 from tirelib.measured.waveforms import Waveforms
 
 

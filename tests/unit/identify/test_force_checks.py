@@ -7,10 +7,10 @@ import pytest
 
 from tests.unit.identify.test_brush_fit import WIDE, make
 from tirelib.core.errors import CalibrationError
-from tirelib.identify.brush_advice import LARGEST_ANGLE, candidates
-from tirelib.identify.brush_fit import fit_brush
-from tirelib.identify.brush_study import study_of
-from tirelib.identify.force_data import ForceData
+from tirelib.inference.identify.brush_advice import LARGEST_ANGLE, candidates
+from tirelib.inference.identify.brush_fit import fit_brush
+from tirelib.inference.identify.brush_study import study_of
+from tirelib.inference.identify.force_data import ForceData
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.magic_sweep import Sweep, magic_sweep
-from tirelib.identify.force_data import ForceData
-from tirelib.identify.force_noise import force_noise
-from tirelib.identify.force_points import ForcePoints, force_points, noise_of
+from tirelib.inference.identify.force_data import ForceData
+from tirelib.inference.identify.force_noise import force_noise
+from tirelib.inference.identify.force_points import ForcePoints, force_points, noise_of
 
 PLAN = Sweep(pressures=(0.8e5,), cambers=(0.0,))
 

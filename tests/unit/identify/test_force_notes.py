@@ -13,7 +13,7 @@ from tirelib.campaign import (
     read_campaign,
     write_campaign,
 )
-from tirelib.identify.force_notes import force_notes
+from tirelib.inference.identify.force_notes import force_notes
 
 TIME = np.arange(20) / 10.0
 FULL = {

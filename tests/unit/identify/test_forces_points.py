@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.magic_sweep import CAMBERS, Sweep, magic_sweep
-from tirelib.identify.force_data import ForceData
-from tirelib.identify.force_points import force_points, noise_of, set_points
+from tirelib.inference.identify.force_data import ForceData
+from tirelib.inference.identify.force_points import force_points, noise_of, set_points
 
 PLAN = Sweep(loads=(1000.0, 2500.0), pressures=(0.8e5,), cambers=CAMBERS[:1])
 DATA = magic_sweep(1, {}, PLAN)

@@ -13,10 +13,10 @@ from tests.unit.identify.model_waves import LOADS, TIRE, made_waves
 from tirelib.campaign.model import TireGeometry
 from tirelib.core.errors import CalibrationError
 from tirelib.core.parameters import Number, TireFile, read_tire
-from tirelib.identify.campaign_data import StraightRuns, straight_runs
-from tirelib.identify.estimate import Estimate
-from tirelib.identify.identify import estimated, start_file
-from tirelib.identify.structure import STRUCTURE_STD, WITHOUT_SHEAR
+from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.inference.identify.estimate import Estimate
+from tirelib.inference.identify.identify import estimated, start_file
+from tirelib.inference.identify.structure import STRUCTURE_STD, WITHOUT_SHEAR
 from tirelib.model.base import BARE, PLAIN
 
 GOLDEN = Path(__file__).parents[2] / "golden/identification_proof.json"

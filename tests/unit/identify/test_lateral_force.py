@@ -10,10 +10,10 @@ import pytest
 from tirelib.campaign import read_campaign
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import Tire, read_tire
-from tirelib.identify.force_data import ForceData, force_data
-from tirelib.identify.forces import _compared
-from tirelib.identify.lateral_force import KINDS, PressureBand, compare_pressures
-from tirelib.identify.ring_patch import profiles, ring_contact
+from tirelib.inference.identify.force_data import ForceData, force_data
+from tirelib.inference.identify.forces import _compared
+from tirelib.inference.identify.lateral_force import KINDS, PressureBand, compare_pressures
+from tirelib.inference.identify.ring_patch import profiles, ring_contact
 from tirelib.physics.brush.forces import brush_forces
 from tirelib.physics.brush.parameters import BrushParameters
 from tirelib.physics.contact.profiles import PressureProfile

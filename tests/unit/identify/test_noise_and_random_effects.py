@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from tests.unit.identify.model_waves import ANGLE_STD, TIRE, TOLERANCE, made_waves, operating
-from tirelib.identify.noise import (
+from tirelib.inference.identify.noise import (
     LEAST_NOISE,
     RepeatNoise,
     independent,
     measured_tangents,
     repeat_noise,
 )
-from tirelib.identify.random_effects import (
+from tirelib.inference.identify.random_effects import (
     angle_slope,
     scales,
     tangents,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tirelib.identify.span import span
+from tirelib.inference.identify.span import span
 
 RANDOM = np.random.default_rng(8)
 COLUMNS = RANDOM.standard_normal((30, 4)) * np.array([1.0, 1e-6, 1e3, 1e-9])

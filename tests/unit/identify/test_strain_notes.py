@@ -10,10 +10,10 @@ from tests.synthetic import synthetic_run, write
 from tests.unit.identify.model_waves import made_waves
 from tirelib.campaign import Campaign, RunPlan, read_campaign
 from tirelib.core.errors import CalibrationError
-from tirelib.identify.campaign_data import straight_runs
-from tirelib.identify.estimate import Estimate
-from tirelib.identify.identify import _contradictions, _with_run, start_file
-from tirelib.identify.strain_notes import (
+from tirelib.inference.identify.campaign_data import straight_runs
+from tirelib.inference.identify.estimate import Estimate
+from tirelib.inference.identify.identify import _contradictions, _with_run, start_file
+from tirelib.inference.identify.strain_notes import (
     broken_gages,
     gage_notes,
     is_straight,

@@ -8,16 +8,16 @@ import pytest
 from tests.unit.identify.model_waves import LOADS, TIRE, exact_waveform, made_waves, operating
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError
-from tirelib.identify.campaign_data import Data, straight_runs
-from tirelib.identify.delay import STD, UNIT, earlier
-from tirelib.identify.discrepancy import Discrepancy
-from tirelib.identify.identify import prior_std, start_file
-from tirelib.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
-from tirelib.identify.waveform_problem import MISFIT, WaveformProblem, WaveformSolved
-from tirelib.identify.whiten_runs import RunWhitening
-from tirelib.infer import posterior
-from tirelib.infer.normal import Normal
-from tirelib.infer.problem import Point
+from tirelib.inference.identify.campaign_data import Data, straight_runs
+from tirelib.inference.identify.delay import STD, UNIT, earlier
+from tirelib.inference.identify.discrepancy import Discrepancy
+from tirelib.inference.identify.identify import prior_std, start_file
+from tirelib.inference.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
+from tirelib.inference.identify.waveform_problem import MISFIT, WaveformProblem, WaveformSolved
+from tirelib.inference.identify.whiten_runs import RunWhitening
+from tirelib.inference.statistics import posterior
+from tirelib.inference.statistics.normal import Normal
+from tirelib.inference.statistics.problem import Point
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import BARE, FREE, PLAIN, Coordinate, predict, values_of
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.effects import Effect, effect
-from tirelib.infer.plain import Family
-from tirelib.infer.problem import Point
+from tirelib.inference.statistics.plain import Family
+from tirelib.inference.statistics.problem import Point
 
 N, SHAPES = 300, 6
 PLAIN = {"swell": 0.05, "bend": 0.002, "twist": 0.002, "smooth, all": 0.3, "smooth, there": 0.05}

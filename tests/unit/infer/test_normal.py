@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tirelib.infer.normal import Normal, Weighed, taken
+from tirelib.inference.statistics.normal import Normal, Weighed, taken
 
 
 @pytest.fixture(scope="module")

@@ -9,11 +9,11 @@ from scipy import stats
 
 from tests.unit.infer.linear_problem import SHAPES, N, Toy, drawn, family
 from tirelib.core.arrays import FloatArray
-from tirelib.infer import null
-from tirelib.infer.hypothesis import Hypothesis, judged
-from tirelib.infer.null import standard
-from tirelib.infer.plain import Family
-from tirelib.infer.posterior import posterior
+from tirelib.inference.statistics import null
+from tirelib.inference.statistics.hypothesis import Hypothesis, judged
+from tirelib.inference.statistics.null import standard
+from tirelib.inference.statistics.plain import Family
+from tirelib.inference.statistics.posterior import posterior
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 LOUD = replace(family(40, 3, "loud"), draws=4.0 * family(40, 3).draws)

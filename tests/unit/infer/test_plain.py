@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.unit.infer.linear_problem import PLAIN, Toy, drawn, family
-from tirelib.infer import null
-from tirelib.infer.hypothesis import judged
-from tirelib.infer.null import Null
-from tirelib.infer.plain import View, learn, load, save
-from tirelib.infer.posterior import posterior
+from tirelib.inference.statistics import null
+from tirelib.inference.statistics.hypothesis import judged
+from tirelib.inference.statistics.null import Null
+from tirelib.inference.statistics.plain import View, learn, load, save
+from tirelib.inference.statistics.posterior import posterior
 
 COMMON = 0.4
 """What every tire of the family shows of `swell`, in ranges."""

@@ -5,8 +5,8 @@ import pytest
 from scipy import optimize
 
 from tests.unit.infer.linear_problem import EFFECTS, Louder, N, Toy, drawn, family
-from tirelib.infer.bounded import bounded_step
-from tirelib.infer.posterior import posterior
+from tirelib.inference.statistics.bounded import bounded_step
+from tirelib.inference.statistics.posterior import posterior
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 SPREAD = FAMILIES[0].shown()

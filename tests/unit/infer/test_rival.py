@@ -8,11 +8,11 @@ import pytest
 
 from tests.unit.infer.linear_problem import EFFECTS, N, Toy, by_effect, drawn, family
 from tirelib.core.arrays import FloatArray
-from tirelib.infer.hypothesis import LAWS, Hypothesis
-from tirelib.infer.posterior import Posterior
-from tirelib.infer.problem import Point
-from tirelib.infer.rival import p_against
-from tirelib.infer.select import Hypotheses, select
+from tirelib.inference.statistics.hypothesis import LAWS, Hypothesis
+from tirelib.inference.statistics.posterior import Posterior
+from tirelib.inference.statistics.problem import Point
+from tirelib.inference.statistics.rival import p_against
+from tirelib.inference.statistics.select import Hypotheses, select
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 LAW, WAYS = LAWS[1], 30

@@ -10,10 +10,10 @@ import pytest
 from tests.unit.infer.linear_problem import SHAPES, N, Solved, Toy, drawn, family
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
-from tirelib.infer.hypothesis import Hypothesis, judged
-from tirelib.infer.posterior import Posterior, posterior
-from tirelib.infer.problem import Point
-from tirelib.infer.select import Hypotheses, _apart, _further, select
+from tirelib.inference.statistics.hypothesis import Hypothesis, judged
+from tirelib.inference.statistics.posterior import Posterior, posterior
+from tirelib.inference.statistics.problem import Point
+from tirelib.inference.statistics.select import Hypotheses, _apart, _further, select
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 
@@ -294,7 +294,7 @@ def test_an_effect_that_states_a_start_is_tried_whatever_it_does_at_zero(
     start: tuple[float, ...], tried: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One hypothesis of one effect is fitted, that which stands out; and this one."""
-    monkeypatch.setattr("tirelib.infer.select.SINGLES", 1)
+    monkeypatch.setattr("tirelib.inference.statistics.select.SINGLES", 1)
     toy = Toy(drawn(np.random.default_rng(8), swell=0.6))
     toy.living = (*toy.living[:2], replace(toy.living[2], start=start))
     found = select(toy, FAMILIES)

@@ -6,10 +6,10 @@ import numpy as np
 
 from tests.unit.force_points import MODEL
 from tirelib.core.arrays import FloatArray
-from tirelib.diagnose.forces.assess import ForceCase
-from tirelib.diagnose.forces.fit import MeasuredForce
-from tirelib.identify.force_data import ForceData
-from tirelib.identify.force_points import force_points
+from tirelib.inference.diagnose.forces.assess import ForceCase
+from tirelib.inference.diagnose.forces.fit import MeasuredForce
+from tirelib.inference.identify.force_data import ForceData
+from tirelib.inference.identify.force_points import force_points
 from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
 
 PRESSURES = (1.7e5, 2.0e5, 2.3e5)

@@ -7,18 +7,18 @@ import numpy as np
 
 from tests.synthetic import LATERAL
 from tests.unit.identify.model_waves import TIRE, made_waves, operating
-from tirelib.diagnose.diagnose import plain_tires
 from tirelib.effects import CATALOGUE
-from tirelib.identify.campaign_data import StraightRuns, straight_runs
-from tirelib.infer.select import Hypotheses
+from tirelib.inference.diagnose.diagnose import plain_tires
+from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
+from tirelib.inference.planning.criterion import NextTest
+from tirelib.inference.planning.envelope import Envelope
+from tirelib.inference.planning.next_test import next_test
+from tirelib.inference.planning.suspects import Suspects, given_suspects
+from tirelib.inference.problems.strain import StrainProblem
+from tirelib.inference.statistics.select import Hypotheses
 from tirelib.model import solution
 from tirelib.model.base import operating_points, values_of
 from tirelib.model.state import Operating
-from tirelib.planning.criterion import NextTest
-from tirelib.planning.envelope import Envelope
-from tirelib.planning.next_test import next_test
-from tirelib.planning.suspects import Suspects, given_suspects
-from tirelib.problems.strain import StrainProblem
 
 NOISE = 2e-6
 PLANTED, TWIN = "temperature", "dynamic_stiffening"

@@ -8,17 +8,17 @@ import pytest
 
 from tests.unit.planning.drifting import NOISE, PRESSURES, case, side_force
 from tirelib.core.errors import ParameterError
-from tirelib.diagnose.forces.assess import ForceAssessment, ForceCase, assess_forces
-from tirelib.diagnose.forces.document import force_diagnosis_document
-from tirelib.diagnose.forces.models import plain_tires
 from tirelib.effects import CATALOGUE
-from tirelib.infer.problem import Point
-from tirelib.infer.select import Hypotheses
-from tirelib.planning.criterion import NOTHING, NextTest
-from tirelib.planning.document import plan_document, plan_force_test
-from tirelib.planning.envelope import Envelope
-from tirelib.planning.force_runs import bench_ahead, force_axes
-from tirelib.planning.suspects import given_suspects, suspects_of
+from tirelib.inference.diagnose.forces.assess import ForceAssessment, ForceCase, assess_forces
+from tirelib.inference.diagnose.forces.document import force_diagnosis_document
+from tirelib.inference.diagnose.forces.models import plain_tires
+from tirelib.inference.planning.criterion import NOTHING, NextTest
+from tirelib.inference.planning.document import plan_document, plan_force_test
+from tirelib.inference.planning.envelope import Envelope
+from tirelib.inference.planning.force_runs import bench_ahead, force_axes
+from tirelib.inference.planning.suspects import given_suspects, suspects_of
+from tirelib.inference.statistics.problem import Point
+from tirelib.inference.statistics.select import Hypotheses
 
 PAIR = ["friction_pressure", "friction_drift"]
 BRUSH = [effect for effect in CATALOGUE.values() if effect.hook == "brush"]

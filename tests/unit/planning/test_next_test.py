@@ -17,10 +17,10 @@ from tests.unit.planning.made import (
     suspects,
 )
 from tirelib.core.errors import ParameterError
-from tirelib.infer.next_run import DRAWS
-from tirelib.planning.criterion import NOTHING
-from tirelib.planning.document import Plan, advice, plan_document
-from tirelib.planning.next_test import gains, next_test
+from tirelib.inference.planning.criterion import NOTHING
+from tirelib.inference.planning.document import Plan, advice, plan_document
+from tirelib.inference.planning.next_test import gains, next_test
+from tirelib.inference.statistics.next_run import DRAWS
 
 
 def test_both_look_alikes_are_in_the_confidence_set() -> None:

@@ -6,9 +6,9 @@ from tests.unit.diagnose.planted import runs
 from tests.unit.identify.model_waves import TIRE
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
+from tirelib.inference.planning.selftest import Planting, SelfTest, selftest
+from tirelib.inference.planning.selftest_document import selftest_document
 from tirelib.model.base import values_of
-from tirelib.planning.selftest import Planting, SelfTest, selftest
-from tirelib.planning.selftest_document import selftest_document
 
 REPEATS = 6
 

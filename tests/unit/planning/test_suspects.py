@@ -8,9 +8,9 @@ import pytest
 from tests.unit.planning.made import CONDITIONS, points_at
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
-from tirelib.planning.document import Plan, plan_document
-from tirelib.planning.envelope import Envelope, operating_at
-from tirelib.planning.suspects import given_suspects, suspects_of
+from tirelib.inference.planning.document import Plan, plan_document
+from tirelib.inference.planning.envelope import Envelope, operating_at
+from tirelib.inference.planning.suspects import given_suspects, suspects_of
 
 
 def entry(name: str, level: str, twins: tuple[str, ...] = (), in_range: bool = True) -> Any:

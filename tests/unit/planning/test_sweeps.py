@@ -8,14 +8,14 @@ import pytest
 
 from tests.unit.planning.drifting import PRESSURES, case
 from tirelib.core.errors import ParameterError
-from tirelib.diagnose.forces.assess import ForceCase
 from tirelib.effects import CATALOGUE
-from tirelib.identify.force_points import ForcePoints, force_points
-from tirelib.planning.document import Plan, plan_document, plan_force_test
-from tirelib.planning.envelope import Envelope
-from tirelib.planning.force_runs import bench_ahead, force_envelope
-from tirelib.planning.suspects import given_suspects
-from tirelib.planning.sweep import campaign_sweep
+from tirelib.inference.diagnose.forces.assess import ForceCase
+from tirelib.inference.identify.force_points import ForcePoints, force_points
+from tirelib.inference.planning.document import Plan, plan_document, plan_force_test
+from tirelib.inference.planning.envelope import Envelope
+from tirelib.inference.planning.force_runs import bench_ahead, force_envelope
+from tirelib.inference.planning.suspects import given_suspects
+from tirelib.inference.planning.sweep import campaign_sweep
 from tirelib.report.next_test import parts_of, write_next_test
 
 PAIR = ["friction_pressure", "friction_drift"]

@@ -11,10 +11,10 @@ from tests.unit.force_points import force_problem
 from tirelib.core.arrays import FloatArray
 from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE, effect
-from tirelib.infer.plain import Family
-from tirelib.infer.posterior import posterior
-from tirelib.infer.problem import Point
-from tirelib.infer.select import select
+from tirelib.inference.statistics.plain import Family
+from tirelib.inference.statistics.posterior import posterior
+from tirelib.inference.statistics.problem import Point
+from tirelib.inference.statistics.select import select
 
 NAMES = ("ring_pressure", "carcass", "friction_load", "brush_camber", "stiffness_drift")
 STRENGTHS = ([0.3], [0.004], [0.1], [0.1], [0.1, 0.05])

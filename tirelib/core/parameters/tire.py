@@ -129,7 +129,7 @@ BRUSH_FIELDS: Mapping[str, Field] = MappingProxyType(
         ),
     }
 )
-"""Numbers of a tire file that only the brush has; `tirelib.identify.brush_model` reads them."""
+"""Numbers of a tire file that only the brush has; the identification of a brush reads them."""
 
 NUMBERS: Mapping[str, Field] = MappingProxyType({**FIELDS, **BRUSH_FIELDS})
 """Every number that a tire file may hold."""

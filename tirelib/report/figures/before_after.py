@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from tirelib.compare.force_curves import Curve, curves_of, ranked, slip_of
-from tirelib.compare.forces import UNITS, ForceComparison
-from tirelib.compare.strain import Comparison
 from tirelib.core.quantities import QUANTITIES
+from tirelib.inference.compare.force_curves import Curve, curves_of, ranked, slip_of
+from tirelib.inference.compare.forces import UNITS, ForceComparison
+from tirelib.inference.compare.strain import Comparison
 from tirelib.report.error_sentences import fold_name
 from tirelib.report.figures.compare_forces import force_plots
 from tirelib.report.figures.compare_heat import DEGREES, heat_maps

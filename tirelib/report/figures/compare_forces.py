@@ -4,13 +4,13 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from tirelib.compare.force_curves import Curve, ranked, slip_of
-from tirelib.compare.forces import UNITS, ForceComparison
-from tirelib.compare.sentences import told
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.quantities import QUANTITIES
-from tirelib.identify.error_bands import levels
-from tirelib.identify.force_points import CELL_ANGLE
+from tirelib.inference.compare.force_curves import Curve, ranked, slip_of
+from tirelib.inference.compare.forces import UNITS, ForceComparison
+from tirelib.inference.compare.sentences import told
+from tirelib.inference.identify.error_bands import levels
+from tirelib.inference.identify.force_points import CELL_ANGLE
 from tirelib.report.figures.compare_plot import (
     Plot,
     confidence,

@@ -5,12 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 import plotly.graph_objects as go
 
-from tirelib.compare.document import edge_value
-from tirelib.compare.sentences import millimetres, told
-from tirelib.compare.strain import Comparison
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.quantities import QUANTITIES
-from tirelib.identify.error_bands import levels
+from tirelib.inference.compare.document import edge_value
+from tirelib.inference.compare.sentences import millimetres, told
+from tirelib.inference.compare.strain import Comparison
+from tirelib.inference.identify.error_bands import levels
 from tirelib.measured.waveforms import GRID
 from tirelib.report.figures.compare_plot import (
     ANGLE_TITLE,

@@ -4,15 +4,15 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from tirelib.compare.document import edge_value
-from tirelib.compare.runs import Factor
-from tirelib.compare.sectors import SECTORS
-from tirelib.compare.sentences import told
-from tirelib.compare.set_points import NAMES
-from tirelib.compare.strain import Comparison
-from tirelib.compare.tracks import Track
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.quantities import QUANTITIES
+from tirelib.inference.compare.document import edge_value
+from tirelib.inference.compare.runs import Factor
+from tirelib.inference.compare.sectors import SECTORS
+from tirelib.inference.compare.sentences import told
+from tirelib.inference.compare.set_points import NAMES
+from tirelib.inference.compare.strain import Comparison
+from tirelib.inference.compare.tracks import Track
 from tirelib.report.figures.compare_heat import NAMES as CONDITIONS
 from tirelib.report.figures.compare_plot import Plot, confidence, level_means, styled_figure
 from tirelib.report.style import BLACK, BLUE, CATEGORIES, FAINT, RED

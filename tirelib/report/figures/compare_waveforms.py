@@ -3,8 +3,8 @@
 import numpy as np
 import plotly.graph_objects as go
 
-from tirelib.compare.strain import Comparison
 from tirelib.core.arrays import FloatArray
+from tirelib.inference.compare.strain import Comparison
 from tirelib.report.figures.compare_heat import DEGREES
 from tirelib.report.figures.compare_plot import (
     ANGLE_TITLE,

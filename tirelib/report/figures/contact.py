@@ -3,9 +3,9 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tirelib.compare.sentences import millimetres
 from tirelib.core.errors import CalibrationError
 from tirelib.estimators.dissertation import Means
+from tirelib.inference.compare.sentences import millimetres
 from tirelib.report.levels import angle_levels, load_levels, reference_level, upright
 from tirelib.report.style import (
     CATEGORIES,

@@ -5,10 +5,10 @@ import plotly.graph_objects as go
 
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.units import from_si
-from tirelib.diagnose.forces.assess import ForceAssessment
-from tirelib.diagnose.forces.fit import ForceFit
-from tirelib.identify.error_bands import levels
-from tirelib.problems.force_plan import varies
+from tirelib.inference.diagnose.forces.assess import ForceAssessment
+from tirelib.inference.diagnose.forces.fit import ForceFit
+from tirelib.inference.identify.error_bands import levels
+from tirelib.inference.problems.force_plan import varies
 from tirelib.report.figures.compare_plot import DIVERGING, Plot, limit_of, styled_figure
 
 CONDITIONS = (

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tirelib.diagnose.document import Assessment
-from tirelib.diagnose.left import Left, left_of
+from tirelib.inference.diagnose.document import Assessment
+from tirelib.inference.diagnose.left import Left, left_of
 from tirelib.measured.waveforms import GRID
 from tirelib.report.figures.compare_plot import ANGLE_TITLE, Plot, heat, limit_of, styled_figure
 from tirelib.report.page import unit_name

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import plotly.graph_objects as go
 
-from tirelib.extend.document import waterfall as fall_of
+from tirelib.inference.extend.document import waterfall as fall_of
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.page import unit_name
 from tirelib.report.style import BLUE, FAINT, RED

@@ -1,0 +1,1 @@
+"""From a campaign to a tire: what fits, where the model fails, which effect it lacks."""

@@ -1,0 +1,226 @@
+"""The error of a model of strain: one number in one unit, which every verb tells.
+
+    error = rms of W (measured - model) over the straight runs,
+
+where W whitens each run's waveform by the noise and by set points that may be off: load, pressure,
+gain and angle zero by the campaign's tolerances, along the model's slopes. The delay of the gages
+against the trigger is fitted first and taken out, for it is neither the tire's nor the model's. So
+a model without any fault has the error 1.
+
+The unit is the noise of a run's mean waveform. It comes from the data alone: from repeats at equal
+set points, beside what the campaign's own slopes by load, pressure, gain and angle explain of their
+differences (`tirelib.inference.identify.noise`). A model does not change it. Without repeats the
+unit is microstrain, and the error is the rms of what is left beside the delay.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.inference.compare.lag import fitted_delay, late_prediction
+from tirelib.inference.compare.model import Model, Prediction, predict_runs
+from tirelib.inference.compare.set_points import predict_set_points, tangents
+from tirelib.inference.identify.campaign_data import StraightRuns
+from tirelib.inference.identify.noise import LEAST_NOISE
+from tirelib.inference.identify.random_effects import Whitening, scales, whitening_of
+from tirelib.measured.signal import LowPass
+from tirelib.model.base import operating_points
+from tirelib.model.state import Operating
+from tirelib.physics.rolling.solve import Start
+
+NOISE, MICROSTRAIN = "noise", "ustrain"
+
+
+@dataclass(frozen=True, slots=True)
+class ModelError:
+    """A model's error on runs.
+
+    Attributes
+    ----------
+    value : float
+        In `unit`.
+    unit : str
+        noise, or ustrain without repeats.
+    noise : float, [-]
+        Standard deviation of a run's mean waveform by noise; NaN without repeats.
+    rms : float, [-]
+        Rms of model less measured, the delay taken out, set points left in.
+    delay, delay_std : float, [s]
+        Delay of the gages against the trigger.
+    prediction : Prediction
+        With the delay.
+    rest : shape (n_runs, n_phi), [-]
+        Measured less model, the delay taken out.
+    whiten : Whitening or None
+        None without repeats.
+    """
+
+    value: float
+    unit: str
+    noise: float
+    rms: float
+    delay: float
+    delay_std: float
+    prediction: Prediction
+    rest: FloatArray
+    whiten: Whitening | None
+
+    @property
+    def known(self) -> bool:
+        """Whether there are repeats."""
+        return self.unit == NOISE
+
+    def white_of(self, waveforms: FloatArray) -> FloatArray:
+        """Return waveforms (..., n_runs, n_phi) in `unit`: whitened, or microstrain."""
+        return 1e6 * waveforms if self.whiten is None else self.whiten(waveforms)
+
+    @property
+    def by_run(self) -> FloatArray:
+        """The same for each run, shape (n_runs,); their mean square is that of `value`."""
+        return np.asarray(np.sqrt(np.mean(self.white_of(self.rest) ** 2, axis=1)))
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """The keys under which every document tells an error: value, unit, noise, raw rms."""
+        return {
+            "error": self.value,
+            "error_unit": self.unit,
+            "noise": 1e6 * self.noise,
+            "residual_rms_raw": 1e6 * self.rms,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Yardstick:
+    """What errors on runs are measured with; nothing of it is a model's.
+
+    Attributes
+    ----------
+    strain : shape (n_runs, n_phi), [-]
+        Mean over the gages in use.
+    at : Operating
+    scale : shape (n_runs, 4)
+        Standard deviations of load, pressure, gain (relative) and angle zero [rad].
+    noise : float, [-]
+        NaN without repeats.
+    lateral : tuple of float, [m]
+        Places of the gages in use.
+    low_pass : LowPass
+    """
+
+    strain: FloatArray
+    at: Operating
+    scale: FloatArray
+    noise: float
+    lateral: tuple[float, ...]
+    low_pass: LowPass
+
+    @classmethod
+    def of(cls, runs: StraightRuns) -> "Yardstick":
+        """Return the yardstick of a campaign's straight runs."""
+        waves = runs.waves
+        return cls(
+            runs.strain,
+            operating_points(waves),
+            scales(runs.tolerance, waves.angle_std),
+            runs.noise.std,
+            tuple(waves.header.gage_lateral[g] for g in runs.gages),
+            waves.low_pass,
+        )
+
+    def take(self, chosen: BoolArray) -> "Yardstick":
+        """Return the yardstick of some of the runs; the unit stays."""
+        return Yardstick(
+            self.strain[chosen],
+            self.at.take(chosen),
+            self.scale[chosen],
+            self.noise,
+            self.lateral,
+            self.low_pass,
+        )
+
+    @property
+    def unit(self) -> str:
+        """Unit of errors."""
+        return NOISE if np.isfinite(self.noise) else MICROSTRAIN
+
+    def error(
+        self, model: Model, delay: float | None = None, *, start: Start | None = None
+    ) -> ModelError:
+        """Return the error of a model.
+
+        Parameters
+        ----------
+        model : Model
+        delay : float, optional, [s]
+            That of the runs to which the model was fitted, where these are others; it is fitted
+            here by default.
+        start : Rolling or Unknowns, optional
+            Solution of these runs by a model nearby; saves time, the result is the same.
+
+        Raises
+        ------
+        CalibrationError
+            If the model has no solution at the runs' conditions.
+        """
+        found = predict_runs(model, self.at, self.lateral, self.low_pass, start=start)
+        return self.of_prediction(found, delay)
+
+    def of_prediction(self, prediction: Prediction, delay: float | None = None) -> ModelError:
+        """Return the error of what a model predicts without a delay."""
+        raw = self.strain - prediction.strain
+        deviation = 0.0
+        if delay is None:
+            delay, deviation = self._delay(raw, prediction)
+        late = late_prediction(prediction, self.at.omega, delay)
+        rest, whiten = self.strain - late.strain, None
+        value = 1e6 * _rms(rest)
+        if np.isfinite(self.noise):
+            whiten = whitening_of(tangents(late), self.scale, self.noise)
+            value = _rms(whiten(rest))
+        return ModelError(
+            value, self.unit, self.noise, _rms(rest), delay, deviation, late, rest, whiten
+        )
+
+    def _delay(self, raw: FloatArray, prediction: Prediction) -> tuple[float, float]:
+        """Return the common delay of the runs and its standard deviation, [s].
+
+        What is left beside the set points, misfit and all, counts as noise.
+        """
+        tangent = tangents(prediction)
+        first = predict_set_points(raw, tangent, self.scale, self.noise)
+        whiten = whitening_of(tangent, self.scale, max(_rms(raw - first.shift), LEAST_NOISE))
+        return fitted_delay(
+            self.strain, prediction.strain, self.at.omega, whiten, first.independent
+        )
+
+
+def error_of(runs: StraightRuns, model: Model) -> ModelError:
+    """Return the error of a model on a campaign's straight runs.
+
+    Raises
+    ------
+    CalibrationError
+        If the model has no solution at the campaign's conditions.
+    """
+    return Yardstick.of(runs).error(model)
+
+
+def named_errors(before: ModelError, after: ModelError) -> Mapping[str, Any]:
+    """Return the keys under which a document tells the errors before and after a change."""
+    return {
+        "error_unit": before.unit,
+        "noise": 1e6 * before.noise,
+        "error_before": before.value,
+        "error_after": after.value,
+        "residual_rms_before": 1e6 * before.rms,
+        "residual_rms_after": 1e6 * after.rms,
+        "residual_rms_unit": MICROSTRAIN,
+    }
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,314 @@
+"""A model held against the strain waveforms of a campaign."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.inference.compare.error import ModelError, Yardstick
+from tirelib.inference.compare.floor import Floor, floor_of
+from tirelib.inference.compare.gages import Gage, compare_gages, gage_sentences
+from tirelib.inference.compare.lag import lag_message, late_prediction
+from tirelib.inference.compare.model import Model, Prediction, predict_runs
+from tirelib.inference.compare.regions import SLIPS, Region, find_regions
+from tirelib.inference.compare.runs import Chosen, choose
+from tirelib.inference.compare.sectors import Cell, cells, sectors_of
+from tirelib.inference.compare.sentences import sentences
+from tirelib.inference.compare.set_points import NAMES, SetPoints, predict_set_points, tangents
+from tirelib.inference.compare.track_words import track_sentences
+from tirelib.inference.compare.tracks import Track, tracks
+from tirelib.inference.identify.campaign_data import straight_noise
+from tirelib.inference.identify.noise import RepeatNoise
+from tirelib.inference.identify.random_effects import scales
+from tirelib.measured.waveforms import Waveforms
+from tirelib.model.base import operating_points
+
+NO_FIT = 0.5
+"""Share of the rms strain that a model leaves from which it does not fit at all."""
+SIGNIFICANT = 0.01
+BEYOND = 2.0
+"""Rms of the predicted set points, in tolerances, from which they are misfit and not chance."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """The residual against the noise of the repeats.
+
+    Attributes
+    ----------
+    verdict : str
+        One of `VERDICTS`.
+    rms : float, [-]
+        Rms of model less measured, set points and delay taken out.
+    strain_rms : float, [-]
+        Rms of the measurement.
+    p : float
+        Chance of such an error if only noise and set points differ (F test); NaN without repeats.
+    beyond : tuple of str
+        Set points that would have to be off by more than `BEYOND` tolerances (rms).
+    """
+
+    verdict: str
+    rms: float
+    strain_rms: float
+    p: float
+    beyond: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A model and the waveforms of a campaign; arrays over runs in the campaign's order.
+
+    Attributes
+    ----------
+    chosen : Chosen
+        Runs, gages and conditions.
+    model : Model
+    error : ModelError
+        Over the counted (straight) runs, with the delay.
+    prediction : Prediction
+        With the delay.
+    points : SetPoints
+    noise : RepeatNoise
+    difference : shape (n_runs, n_phi), [-]
+        Model less measured, set points taken out; positive: the model shows too much tension.
+    by_gage : shape (n_runs, n_gages, n_phi), [-]
+        The same for each gage.
+    sector : shape (n_runs, n_phi)
+        Number in `SECTORS`.
+    run_rms : shape (n_runs,), [-]
+        Rms of `difference`.
+    fit : Fit
+        Over the counted (straight) runs.
+    floor : Floor
+    table : tuple of Cell
+    regions : tuple of Region
+    sentences : tuple of str
+        Lack of fit in plain words: `regions`, set points, `tracks`, `gages`.
+    tracks : tuple of Track
+    gages : tuple of Gage
+        Each gage by itself.
+    messages : tuple of str
+        What limits the comparison.
+    """
+
+    chosen: Chosen
+    model: Model
+    error: ModelError
+    prediction: Prediction
+    points: SetPoints
+    noise: RepeatNoise
+    difference: FloatArray
+    by_gage: FloatArray
+    sector: IntArray
+    run_rms: FloatArray
+    fit: Fit
+    floor: Floor
+    table: tuple[Cell, ...]
+    regions: tuple[Region, ...]
+    sentences: tuple[str, ...]
+    tracks: tuple[Track, ...]
+    gages: tuple[Gage, ...]
+    messages: tuple[str, ...]
+
+    @property
+    def quantity(self) -> str:
+        """What is compared."""
+        return "strain"
+
+    @property
+    def run(self) -> IntArray:
+        """Run numbers."""
+        return self.chosen.waves.run
+
+    def ranked(self) -> tuple[int, int, int]:
+        """Return the best, the median and the worst counted run, as indices."""
+        counted = np.flatnonzero(self.chosen.straight)
+        order = counted[np.argsort(self.run_rms[counted], kind="stable")]
+        return int(order[0]), int(order[(order.size - 1) // 2]), int(order[-1])
+
+
+def compare_strain(waves: Waveforms, model: Model, data_hash: str = "") -> Comparison:
+    """Hold a model against measured waveforms.
+
+    Parameters
+    ----------
+    waves : Waveforms
+    model : Model
+    data_hash : str
+        `Campaign.content_hash()`; tells whether the model was identified from these data.
+
+    Raises
+    ------
+    CalibrationError
+        If no run can be used, or the model has no solution at the campaign's conditions.
+    """
+    chosen = choose(waves)
+    waves = chosen.waves
+    at = operating_points(waves)
+    lateral = [waves.header.gage_lateral[g] for g in chosen.gages]
+    prediction = predict_runs(model, at, lateral, waves.low_pass)
+    counted = chosen.straight
+    repeats = straight_noise(waves.take(counted), chosen.strain[counted])
+    scale = scales(chosen.tolerance, waves.angle_std)
+    yardstick = Yardstick(
+        chosen.strain, at, scale, repeats.std, tuple(lateral), waves.low_pass
+    ).take(counted)
+    error = yardstick.of_prediction(_part(prediction, counted))
+    prediction = late_prediction(prediction, at.omega, error.delay)
+    tangent, rest = tangents(prediction), chosen.strain - prediction.strain
+    points = _set_points(rest, tangent, scale, repeats.std, chosen)
+    difference = points.shift - rest
+    fit = _fit(error, difference, repeats, points, chosen)
+    sector = sectors_of(prediction.edges)
+    regions: tuple[Region, ...] = ()
+    if fit.verdict == "lack_of_fit":
+        plain = tuple(f for f in chosen.factors if f.name not in SLIPS)
+        slips = tuple(f for f in chosen.factors if f.name in SLIPS)
+        regions = find_regions(difference, chosen.strain, counted, plain, repeats, points)
+        if slips:
+            regions += find_regions(difference, chosen.strain, counted, slips, repeats, points)
+    by_gage = prediction.gages - waves.strain[:, chosen.gages] + points.shift[:, None, :]
+    followed = tracks(waves, chosen.strain, prediction, chosen.tolerance)
+    gages = compare_gages(chosen, by_gage, difference, sector, points)
+    said = sentences(regions, prediction.edges) + _beyond(fit, points, chosen)
+    if fit.verdict in ("fits", "lack_of_fit"):
+        said += track_sentences(followed, counted, chosen.factors)
+        said += gage_sentences(gages, prediction.edges)
+    return Comparison(
+        chosen,
+        model,
+        error,
+        prediction,
+        points,
+        repeats,
+        difference,
+        by_gage,
+        sector,
+        np.sqrt(np.mean(difference**2, axis=1)),
+        fit,
+        floor_of(model, data_hash, error, at.take(counted)),
+        cells(difference, sector, counted, chosen.factors, repeats, points),
+        regions,
+        said,
+        followed,
+        gages,
+        (
+            *_messages(chosen, repeats, fit),
+            *lag_message(error.delay, error.delay_std, at.omega[counted]),
+            *chosen.notes,
+        ),
+    )
+
+
+def _set_points(
+    rest: FloatArray, tangent: FloatArray, scale: FloatArray, noise: float, chosen: Chosen
+) -> SetPoints:
+    """Return the set points; straight runs and the others have their own spread."""
+    counted = chosen.straight
+    first = predict_set_points(rest[counted], tangent[counted], scale[counted], noise)
+    if counted.all():
+        return first
+    second = predict_set_points(rest[~counted], tangent[~counted], scale[~counted], noise)
+    value, shift = np.empty((len(rest), 4)), np.empty_like(rest)
+    covariance = np.empty((len(rest), 5, 5))
+    for part, rows in ((first, counted), (second, ~counted)):
+        value[rows], shift[rows], covariance[rows] = part.value, part.shift, part.covariance
+    return SetPoints(value, scale, covariance, tangent, shift, first.spread, first.independent)
+
+
+def _part(prediction: Prediction, rows: np.ndarray) -> Prediction:
+    return Prediction(*(getattr(prediction, name)[rows] for name in prediction.__slots__))
+
+
+def _fit(
+    error: ModelError,
+    difference: FloatArray,
+    noise: RepeatNoise,
+    points: SetPoints,
+    chosen: Chosen,
+) -> Fit:
+    counted = chosen.straight
+    rms = _rms(difference[counted])
+    strain_rms = _rms(chosen.strain[counted])
+    p = float("nan")
+    if error.known:
+        freedom = points.independent * int(counted.sum())
+        p = float(special.fdtrc(freedom, noise.freedom, error.value**2))
+    scaled = np.sqrt(np.mean(points.scaled[counted] ** 2, axis=0))
+    beyond = tuple(name for name, size in zip(NAMES, scaled, strict=True) if size > BEYOND)
+    verdict = verdict_of(rms / strain_rms, p)
+    if verdict == "fits" and beyond:
+        verdict = "lack_of_fit"
+    return Fit(verdict, rms, strain_rms, p, beyond)
+
+
+def verdict_of(share: float, p: float) -> str:
+    """Return a verdict from the share that a model leaves and the p-value (NaN without noise)."""
+    if p >= SIGNIFICANT:
+        return "fits"
+    if share > NO_FIT:
+        return "does_not_fit"
+    return "noise_unknown" if np.isnan(p) else "lack_of_fit"
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _beyond(fit: Fit, points: SetPoints, chosen: Chosen) -> tuple[str, ...]:
+    """Say which set points would have to be off by far more than their tolerance."""
+    if fit.verdict != "lack_of_fit":
+        return ()
+    out = []
+    for name in fit.beyond:
+        k = NAMES.index(name)
+        value = points.value[chosen.straight, k]
+        rms = float(np.sqrt(np.mean(points.scaled[chosen.straight, k] ** 2)))
+        size, unit = (1e3, "mrad") if name == "angle" else (100.0, "%")
+        out.append(
+            f"From run to run the {_MEANT[name]} differs from {size * value.min():+.2g} to "
+            f"{size * value.max():+.2g} {unit}, {rms:.1f} times the tolerance (rms): something "
+            "that the model lacks acts in this way."
+        )
+    return tuple(out)
+
+
+_MEANT = {
+    "load": "strain that goes with load",
+    "pressure": "strain that goes with pressure",
+    "gain": "size of the strain",
+    "angle": "zero of the wheel angle",
+}
+
+
+def _messages(chosen: Chosen, noise: RepeatNoise, fit: Fit) -> tuple[str, ...]:
+    """Say what limits the comparison."""
+    name = chosen.waves.header.name
+    out = []
+    if fit.verdict == "does_not_fit":
+        out.append(
+            f"The model does not fit at all: it leaves {100 * fit.rms / fit.strain_rms:.0f} % of "
+            f"the measured strain (no model leaves 100 %, {100 * NO_FIT:.0f} % is the limit). "
+            "Where it fails says nothing then; identify it from this campaign first, or look for "
+            "a wrong unit, sign or tire."
+        )
+    if not noise.known:
+        out.append(
+            f"{name} has no repeated run: the noise is unknown, so errors are given in "
+            "microstrain, and whether they exceed the noise is open. Repeat three set points or "
+            "more."
+        )
+    factors = [f.name for f in chosen.factors if f.name in ("load", "pressure", "speed")]
+    if not factors:
+        out.append(
+            f"{name} holds one condition only: what changes with load, pressure or speed cannot "
+            "be seen. Measure at least two loads, and if possible two pressures and speeds."
+        )
+    if 0 < noise.repeats < 3:
+        out.append(
+            f"{name} repeats {noise.repeats} set point(s) only: the noise is uncertain by about "
+            f"{100 / np.sqrt(2 * max(noise.freedom, 1)):.0f} % or more."
+        )
+    return tuple(out)

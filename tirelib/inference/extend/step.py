@@ -1,0 +1,201 @@
+"""One effect more or less, for strain and for forces: fit, fit again, judge on what is left out.
+
+What differs is how a model is fitted to its campaign, what its floor is and what can be left out:
+`Models` say it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError, ParameterError
+from tirelib.effects import Effect
+from tirelib.inference.diagnose.held_out import Fold
+
+SIGNIFICANT = 2.0
+"""Standard deviations below which a strength is no different from zero."""
+
+
+class Fit(Protocol):
+    """A fitted model."""
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """That the model has."""
+
+    @property
+    def strengths(self) -> tuple[FloatArray, ...]:
+        """One array of components per effect."""
+
+    @property
+    def error(self) -> float:
+        """Rms of what is left."""
+
+    def strength_std(self, index: int) -> FloatArray:
+        """Return standard deviations of an effect's strength."""
+
+
+F = TypeVar("F", bound=Fit)
+
+
+class Models(Protocol[F]):
+    """A model on a campaign, and others about it, each fitted once."""
+
+    @property
+    def folds(self) -> Sequence[Fold]:
+        """What can be left out of a fit in turn."""
+
+    def at(self) -> F:
+        """Return the model as it is, fitted."""
+
+    def dead(self, effect: Effect) -> str:
+        """Return why the campaign cannot show an effect, or an empty text."""
+
+    def with_effect(self, before: F, effect: Effect) -> F:
+        """Return the fit with one effect more."""
+
+    def held_out(self, fit: F) -> tuple[float, ...]:
+        """Return the errors on what is left out."""
+
+    def floor(self, fit: F) -> float:
+        """Return the error that structure leaves."""
+
+
+@dataclass(frozen=True, eq=False)
+class Step(Generic[F]):
+    """A model before and after an effect was added or removed, both fitted.
+
+    Attributes
+    ----------
+    action : str
+        add or remove.
+    effect : Effect
+    strength, std : shape (components,)
+        With the effect, in its unit.
+    before, after : Fit
+    floor : float
+        Error that structure leaves.
+    folds : tuple
+        What is left out in turn.
+    held_before, held_after : tuple of float
+        Errors on it, one per fold.
+    flags : tuple of str
+        out_of_range, not_significant, no_gain, heldout_worse.
+    """
+
+    action: str
+    effect: Effect
+    strength: FloatArray
+    std: FloatArray
+    before: F
+    after: F
+    floor: float
+    folds: tuple[Fold, ...]
+    held_before: tuple[float, ...]
+    held_after: tuple[float, ...]
+    flags: tuple[str, ...]
+
+
+def added(models: Models[F], effect: Effect, before: F | None = None) -> Step[F]:
+    """Return a model with one effect more, everything fitted anew.
+
+    Parameters
+    ----------
+    models : Models
+    effect : Effect
+    before : Fit, optional
+        One of the models, with effects that were added before; the one without by default.
+
+    Raises
+    ------
+    CalibrationError
+        If the campaign cannot show it.
+    ConvergenceError
+        If a fit does not settle.
+    """
+    if reason := models.dead(effect):
+        raise CalibrationError(
+            f"effect {effect.name!r}: this campaign cannot show it: {reason}; measure such runs, "
+            "or leave the effect out"
+        )
+    first = before or models.at()
+    after = models.with_effect(first, effect)
+    return _judged("add", effect, models, first, models, after)
+
+
+def removed(models: Models[F], effect: Effect, fewer: Models[F]) -> Step[F]:
+    """Return a model without one of its effects, which others are about; the rest fitted anew.
+
+    Raises
+    ------
+    ConvergenceError
+        If a fit does not settle.
+    """
+    return _judged("remove", effect, models, models.at(), fewer, fewer.at())
+
+
+def refuse_second(name: str, has: Sequence[Effect], effect: Effect) -> None:
+    """Raise ParameterError if a model, by its name, has an effect already."""
+    if effect.name in {each.name for each in has}:
+        raise ParameterError(
+            f"{name}: it has the effect {effect.name!r} already; choose another one, or take it "
+            "out first with --remove"
+        )
+
+
+def kept(name: str, has: Sequence[Effect], effect: Effect, acts_on: str) -> list[int]:
+    """Return the places of the effects that stay where one is removed.
+
+    Raises
+    ------
+    ParameterError
+        If the model does not have the effect.
+    """
+    names = [each.name for each in has]
+    if effect.name not in names:
+        raise ParameterError(
+            f"{name}: it has no effect {effect.name!r} of {acts_on} to remove; it has "
+            f"{', '.join(names) or 'none'}"
+        )
+    return [k for k, each in enumerate(names) if each != effect.name]
+
+
+def _judged(
+    action: str, effect: Effect, models: Models[F], before: F, others: Models[F], after: F
+) -> Step[F]:
+    """Return the step between two models."""
+    having = after if action == "add" else before
+    index = [each.name for each in having.effects].index(effect.name)
+    strength, std = having.strengths[index], having.strength_std(index)
+    folds = tuple(models.folds)
+    held_before, held_after = models.held_out(before), others.held_out(after)
+    flags = []
+    if ((strength < effect.low) | (strength > effect.high)).any():
+        flags.append("out_of_range")
+    if (np.abs(strength) < SIGNIFICANT * std).all():
+        flags.append("not_significant")
+    if action == "add" and after.error >= before.error * (1.0 - 1e-6):
+        flags.append("no_gain")
+    counted = [
+        new > old
+        for new, old, fold in zip(held_after, held_before, folds, strict=True)
+        if fold.main
+    ]
+    if any(counted):
+        flags.append("heldout_worse")
+    return Step(
+        action,
+        effect,
+        strength,
+        std,
+        before,
+        after,
+        others.floor(after),
+        folds,
+        held_before,
+        held_after,
+        tuple(flags),
+    )

@@ -1,0 +1,177 @@
+"""Points of equal conditions as one: what a study of the brush's misfit is computed on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.inference.identify.brush_law import point_parameters
+from tirelib.inference.identify.brush_problem import BrushProblem
+from tirelib.inference.identify.error_bands import levels
+from tirelib.inference.identify.force_data import ForceData
+from tirelib.physics.brush.predict import PointParameters
+
+FEW = 150
+"""Up to so many points each is its own cell."""
+MOST_CELLS = 800
+_CAMBER = float(np.deg2rad(0.5))
+_SLIPS = 36
+"""Cells over the range of a slip."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Conditions:
+    """Where forces are looked at, arrays of shape (m,).
+
+    Attributes
+    ----------
+    load, pressure, slip_angle, slip_ratio, camber : [N], [Pa], [rad], [-], [rad]
+    slide_angle, slide_ratio : [rad], [-]
+        Slips at which the brush slides as a whole, at this load and pressure.
+    """
+
+    load: FloatArray
+    pressure: FloatArray
+    slip_angle: FloatArray
+    slip_ratio: FloatArray
+    camber: FloatArray
+    slide_angle: FloatArray
+    slide_ratio: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cells:
+    """Misfit and its slopes by cell, of one force, over the force's scale.
+
+    Attributes
+    ----------
+    force : str
+    at : Conditions
+        Means over the cells.
+    misfit : shape (m,)
+        Mean of measured less predicted.
+    smooth : shape (m,)
+        The same for a curve that has the brush's slope at zero and its friction, but no bend at
+        zero slip.
+    slope : shape (m, p)
+        Slope of the prediction by z.
+    weight : shape (m,)
+        Sum of the points' weights.
+    """
+
+    force: str
+    at: Conditions
+    misfit: FloatArray
+    smooth: FloatArray
+    slope: FloatArray
+    weight: FloatArray
+
+
+def cells_of(problem: BrushProblem, z: FloatArray, robust: float | None) -> tuple[Cells, ...]:
+    """Return the cells of each force of a solved problem."""
+    data = problem.data
+    residual = problem.residual(z)
+    slope = problem.jacobian(z).reshape(*residual.shape, z.size)
+    number = cell_numbers(data)
+    values = {name: value for name, (value, _) in problem.fixed.items()}
+    values |= dict(zip(problem.names, problem.values_of(z).tolist(), strict=True))
+    brush = point_parameters(values, data, problem.reference, problem.half)
+    angle, ratio = sliding_slips(brush, data.load)
+    scale = np.asarray(problem.scale)
+    out = []
+    for k, name in enumerate(problem.forces):
+        known = np.isfinite(getattr(data, name))
+        weight = known.astype(np.float64)
+        if robust is not None:
+            weight = weight * robust / np.maximum(np.abs(residual[k]), robust)
+        mean = _Mean(number, weight)
+        at = Conditions(
+            mean(data.load),
+            mean(np.nan_to_num(data.pressure, nan=1.0)),
+            mean(data.slip_angle),
+            mean(data.slip_ratio),
+            mean(data.camber),
+            mean(angle),
+            mean(ratio),
+        )
+        columns = [mean(slope[k, :, j]) for j in range(z.size)]
+        misfit = -mean(residual[k])
+        bend = mean(_bend(name, brush, data)) / float(scale[k])
+        out.append(Cells(name, at, misfit, misfit + bend, np.stack(columns, axis=1), mean.total))
+    return tuple(out)
+
+
+class _Mean:
+    """Weighted mean over the cells that have any weight."""
+
+    def __init__(self, number: IntArray, weight: FloatArray) -> None:
+        self.number, self.weight = number, weight
+        every = np.asarray(np.bincount(number, weight), dtype=np.float64)
+        self.used = every > 0.0
+        self.total: FloatArray = every[self.used]
+
+    def __call__(self, values: FloatArray) -> FloatArray:
+        """Return the mean of values by cell."""
+        summed = np.bincount(self.number, self.weight * values)[self.used]
+        return np.asarray(summed / self.total, dtype=np.float64)
+
+
+def sliding_slips(brush: PointParameters, load: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the slip angles [rad] and slip ratios at which the whole contact slides."""
+    across, along = slip_stiffnesses(brush)
+    force = 3.0 * np.asarray(brush.friction) * load
+    return np.arctan(force / across), np.asarray(force / along)
+
+
+def slip_stiffnesses(brush: PointParameters) -> tuple[FloatArray, FloatArray]:
+    """Return 2 c a^2 over slip angle [N/rad] and slip ratio [N]."""
+    size = 2.0 * np.asarray(brush.half_length, dtype=np.float64) ** 2
+    across = np.asarray(brush.lateral_stiffness, dtype=np.float64)
+    along = brush.longitudinal_stiffness
+    return across * size, (across if along is None else np.asarray(along)) * size
+
+
+def _bend(force: str, brush: PointParameters, data: ForceData) -> FloatArray:
+    """Return by how much the brush exceeds a curve of the same slope and friction without bend.
+
+    With x the demand over mu Fz, the brush is x - x^2/3 + x^3/27 of either sign of slip, and the
+    other curve tanh x; for the moment x (1 - x/3)^3 and x / cosh^2(3 x / 4).
+    """
+    across, along = slip_stiffnesses(brush)
+    limit = np.asarray(brush.friction) * data.load
+    thrust = np.asarray(brush.camber_thrust) * data.camber
+    side = -across * np.tan(data.slip_angle + np.asarray(brush.slip_angle_offset) + thrust)
+    drive = along * (data.slip_ratio + np.asarray(brush.slip_ratio_offset))
+    demand = np.hypot(side, drive)
+    share = np.where(demand > 0.0, (drive if force == "Fx" else side) / np.maximum(demand, 1e-9), 0)
+    x = demand / limit
+    held = np.minimum(x, 3.0)
+    if force == "Mz":
+        arm = -np.asarray(brush.half_length) / 3.0
+        excess = held * (1.0 - held / 3.0) ** 3 - x / np.cosh(np.minimum(0.75 * x, 50.0)) ** 2
+        return np.asarray(arm * limit * share * excess)
+    return np.asarray(limit * share * (held - held**2 / 3.0 + held**3 / 27.0 - np.tanh(x)))
+
+
+def cell_numbers(data: ForceData) -> IntArray:
+    """Return the number of each point's cell, from 0; at most 800 cells."""
+    if len(data) <= FEW:
+        return np.arange(len(data))
+    share = 1.0
+    while True:
+        rows = [
+            levels(data.load),
+            levels(data.pressure),
+            np.round(data.camber / (_CAMBER * share)),
+            _bins(data.slip_angle, share),
+            _bins(data.slip_ratio, share),
+        ]
+        _, number = np.unique(np.stack(rows), axis=1, return_inverse=True)
+        if number.max() < MOST_CELLS:
+            return np.asarray(number, dtype=np.int64).ravel()
+        share *= 1.5
+
+
+def _bins(values: FloatArray, share: float) -> FloatArray:
+    span = float(np.ptp(values))
+    return np.round(values / (span * share / _SLIPS)) if span > 0.0 else np.zeros_like(values)

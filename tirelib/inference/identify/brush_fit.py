@@ -1,0 +1,285 @@
+"""Brush parameters from the forces of a campaign.
+
+Fy, Fx and Mz over slip angle, slip ratio, load and pressure, by least squares that give single
+outliers little weight. The channels are weighed by their own misfit, Fx and Fy together, Mz by a
+tenth: enough for the contact length, too little to bend stiffness and friction.
+Errors of points in one block (a run, or some seconds of a sweep) may go together; the standard
+deviations allow for that. They do not hold the brush's structural misfit that all blocks share.
+
+From Fy alone only c_py a^2 and mu are known; the contact length needs Mz, a tire's ring, or a
+measured value.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError, ParameterError
+from tirelib.core.parameters import Tire
+from tirelib.inference.identify.brush_law import (
+    NEUTRAL,
+    SPECS,
+    Reference,
+    point_parameters,
+    predict,
+)
+from tirelib.inference.identify.brush_problem import ASSUMED_HALF_LENGTH, BrushProblem
+from tirelib.inference.identify.error_bands import BandError, band_errors
+from tirelib.inference.identify.force_checks import refuse_wrong_forces, slips_vary
+from tirelib.inference.identify.force_data import FORCES, ForceData
+from tirelib.inference.identify.ring_patch import ring_half
+from tirelib.physics.brush.predict import PointForces, PointParameters
+
+LOAD_RATIO = 1.1
+"""Least ratio of loads that tells anything of the law."""
+_START_POINTS = 4000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BrushFit:
+    """Result of a fit.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the fitted parameters, as in `tirelib.inference.identify.brush_law.SPECS`.
+    value, std : arrays, shape (p,)
+        In the parameters' SI units; std is infinite where the data do not hold a parameter.
+    covariance : array, shape (p, p)
+    status : tuple of str
+        For each fitted parameter: "ok", "at boundary" or "not identifiable from this campaign".
+    held : mapping of name to (value, reason)
+        Parameters that were not fitted.
+    reference : Reference
+        Load and pressure of a0.
+    tire : Tire or None
+        Gives the half lengths, if any.
+    rmse, r2, peak : mapping of force to float
+        Root mean square error, share of variance explained, largest measured size.
+    errors : tuple of BandError
+        By force: all points, then bands of load, pressure and slip angle.
+    points : int
+    """
+
+    names: tuple[str, ...]
+    value: FloatArray
+    std: FloatArray
+    covariance: FloatArray
+    status: tuple[str, ...]
+    held: Mapping[str, tuple[float, str]]
+    reference: Reference
+    tire: Tire | None
+    rmse: Mapping[str, float]
+    r2: Mapping[str, float]
+    peak: Mapping[str, float]
+    errors: tuple[BandError, ...]
+    points: int
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every parameter, fitted or held."""
+        fitted = dict(zip(self.names, self.value.tolist(), strict=True))
+        return {**{name: value for name, (value, _) in self.held.items()}, **fitted}
+
+    def parameters(self, data: ForceData) -> PointParameters:
+        """Return the brush at the points of other data."""
+        return point_parameters(self.values, data, self.reference, ring_half(self.tire, data))
+
+    def predict(self, data: ForceData) -> PointForces:
+        """Return the forces at the points of other data."""
+        return predict(self.values, data, self.reference, ring_half(self.tire, data))
+
+
+def fit_brush(
+    data: ForceData,
+    *,
+    forces: Sequence[str] | None = None,
+    free: Collection[str] = (),
+    held: Mapping[str, float] | None = None,
+    tire: Tire | None = None,
+    robust: float | None = 3.0,
+    limit: float = 0.5,
+) -> BrushFit:
+    """Fit the brush to measured forces.
+
+    Parameters
+    ----------
+    data : ForceData
+    forces : sequence of str, optional
+        Of Fy, Fx, Mz; by default those that are measured and to which the slips matter.
+    free : collection of str
+        Parameters fitted besides c_py, c_px, mu, a0, n and the offsets: `pressure_power`,
+        `camber_thrust`, `yaw_compliance`, `lateral_compliance`.
+    held : mapping of name to value, optional
+        Parameters that are known; not fitted.
+    tire : Tire, optional
+        Its ring gives the half contact length at every load and pressure.
+    robust : float or None
+        Misfit, in robust standard deviations, from which a point counts less (Huber); None is plain
+        least squares.
+    limit : float
+        Uncertainty up to which a parameter counts as identified, relative to its size.
+
+    Raises
+    ------
+    CalibrationError
+        If the slips do not vary, or the forces are not measured.
+    ParameterError
+        If a name or an option is not allowed.
+    """
+    known = dict(held or {})
+    wanted = _forces(data, forces)
+    refuse_wrong_forces(data, wanted)
+    names, fixed = _choose(data, wanted, set(free), known, tire, robust)
+    if not names:
+        raise ParameterError("brush fit: every parameter is held; leave one free")
+    reference = Reference(float(np.median(data.load)), float(np.median(data.pressure)))
+    problem = BrushProblem(data, wanted, names, fixed, reference, ring_half(tire, data))
+    z = problem.start()
+    few = len(data) > _START_POINTS
+    if few:
+        z = problem.take(np.arange(0, len(data), len(data) // _START_POINTS)).solve(z, None)
+    scale = problem.scale
+    for loss in (None,) if robust is None and len(wanted) == 1 else (None, robust, robust):
+        z = problem.solve(z, loss)
+        scale = problem.misfit(z)
+        problem = problem.weighed(scale)
+    covariance_z = problem.covariance(z, robust)
+    value, slope = problem.values_of(z), problem.slope_of(z)
+    deviation = np.sqrt(np.diag(covariance_z))
+    with np.errstate(invalid="ignore"):
+        covariance = covariance_z * np.outer(slope, slope)
+    status = tuple(
+        _status(
+            name,
+            at,
+            spread,
+            limit,
+            assumed="half_length" in fixed
+            and not tire
+            and fixed["half_length"][1].startswith("assumed"),
+        )
+        for name, at, spread in zip(names, value, deviation, strict=True)
+    )
+    found = problem.predicted(z)
+    measured = {name: getattr(data, name) for name in wanted}
+    error = {name: getattr(found, name) - measured[name] for name in wanted}
+    return BrushFit(
+        names,
+        value,
+        deviation * slope,
+        covariance,
+        status,
+        fixed,
+        reference,
+        tire,
+        {name: float(np.sqrt(np.nanmean(e**2))) for name, e in error.items()},
+        {name: float(1.0 - np.nanvar(e) / np.nanvar(measured[name])) for name, e in error.items()},
+        {name: float(np.nanmax(np.abs(m))) for name, m in measured.items()},
+        tuple(row for name, e in error.items() for row in band_errors(name, data, e)),
+        len(data),
+    )
+
+
+def _forces(data: ForceData, forces: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the forces to fit, after a look at what the data can tell."""
+    turns, brakes = slips_vary(data)
+    useful = {"Fy": turns, "Fx": brakes, "Mz": turns}
+    measured = {n: bool(np.isfinite(getattr(data, n)).sum() > 3) for n in FORCES}
+    if forces is None:
+        chosen = tuple(n for n in FORCES if useful[n] and measured[n])
+        if not chosen or chosen == ("Mz",):
+            needed = [n for n in ("Fy", "Fx") if useful[n]]
+            raise CalibrationError(
+                f"brush fit: {' and '.join(needed)} not measured; record what is to be fitted"
+            )
+        return chosen
+    for name in forces:
+        if name not in FORCES:
+            raise ParameterError(f"brush fit: force {name!r}; allowed are {', '.join(FORCES)}")
+        if not measured[name]:
+            raise CalibrationError(f"brush fit: {name} is not measured; leave it out of the fit")
+        if not useful[name]:
+            slip = "slip ratio" if name == "Fx" else "slip angle"
+            raise CalibrationError(
+                f"brush fit: the {slip} does not vary, so {name} does not determine the brush; "
+                f"leave {name} out, or add runs"
+            )
+    return tuple(dict.fromkeys(forces))
+
+
+def _choose(
+    data: ForceData,
+    forces: tuple[str, ...],
+    extra: set[str],
+    known: dict[str, float],
+    tire: Tire | None,
+    robust: float | None,
+) -> tuple[tuple[str, ...], dict[str, tuple[float, str]]]:
+    """Return the parameters to fit, and the others with value and reason."""
+    for name in (*extra, *known):
+        if name not in SPECS:
+            raise ParameterError(
+                f"brush fit: {name!r} is no parameter; allowed are {', '.join(SPECS)}"
+            )
+    for name, value in known.items():
+        if not SPECS[name].low <= value <= SPECS[name].high:
+            raise ParameterError(
+                f"brush fit: held {name} = {value:.6g}; allowed is {SPECS[name].low:g} .. "
+                f"{SPECS[name].high:g} {SPECS[name].unit}; give SI"
+            )
+    if robust is not None and not robust > 0.0:
+        raise ParameterError(f"brush fit: robust = {robust:g}; allowed is > 0, or None")
+    side, along, yaw = (name in forces for name in ("Fy", "Fx", "Mz"))
+    ring = tire is not None
+    reasons = {
+        "lateral_stiffness": "" if side or yaw else "no slip angle varies",
+        "longitudinal_stiffness": "" if along else "no Fx over slip ratio",
+        "half_length": "from the ring" if ring else "" if yaw else "assumed: Mz is not fitted",
+        "load_power": "from the ring"
+        if ring
+        else ""
+        if data.load.max() > LOAD_RATIO * data.load.min()
+        else "one load only",
+        "slip_angle_offset": "" if side or yaw else "no slip angle varies",
+        "Fy_offset": "" if side else "Fy is not fitted",
+        "Mz_offset": "" if yaw else "Mz is not fitted",
+        "slip_ratio_offset": "" if along else "Fx is not fitted",
+        "Fx_offset": "" if along else "Fx is not fitted",
+    }
+    if ring:
+        extra = extra - {"pressure_power"}
+    names: list[str] = []
+    held: dict[str, tuple[float, str]] = {}
+    for name in SPECS:
+        reason = reasons.get(name, "" if name in extra or name == "friction" else "left out")
+        if name in known:
+            held[name] = (known[name], "given")
+        elif not reason or (name in extra and name != "half_length"):
+            names.append(name)
+        elif name == "half_length" and not ring:
+            held[name] = (ASSUMED_HALF_LENGTH, reason)
+        elif name in NEUTRAL:
+            held[name] = (NEUTRAL[name], reason)
+    if "lateral_stiffness" not in (*names, *held):
+        # braking alone: one stiffness for both directions
+        names = ["lateral_stiffness", *(n for n in names if n != "longitudinal_stiffness")]
+    return tuple(names), held
+
+
+def _status(name: str, value: float, spread: float, limit: float, *, assumed: bool) -> str:
+    spec = SPECS[name]
+    room = 1e-3 * (np.log(spec.high / spec.low) if spec.log else spec.high - spec.low)
+    low, high = (
+        np.log([value / spec.low, spec.high / value])
+        if spec.log
+        else (value - spec.low, spec.high - value)
+    )
+    if min(low, high) < room:
+        return "at boundary"
+    stiffness = name in ("lateral_stiffness", "longitudinal_stiffness")
+    if not spread <= limit or (assumed and stiffness):
+        return "not identifiable from this campaign"
+    return "ok"

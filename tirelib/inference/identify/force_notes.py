@@ -1,0 +1,69 @@
+"""What of a campaign's forces cannot be used, in words: nothing is left out silently."""
+
+import numpy as np
+
+from tirelib.campaign import Campaign, Run
+from tirelib.inference.identify.force_data import FORCES, FREE_ROLLING
+from tirelib.inference.identify.strain_notes import named
+
+
+def force_notes(campaign: Campaign) -> tuple[str, ...]:
+    """Return one sentence for each kind of sample or run that the forces cannot be fitted to.
+
+    `tirelib.inference.identify.force_data.force_data` leaves out what has no load or slip angle,
+    and takes an unknown slip ratio or camber as zero.
+    """
+    samples = 0
+    lost: dict[str, list[int]] = {}
+    blank: dict[str, list[int]] = {}
+    stood: dict[str, list[int]] = {}
+    for run in campaign.runs():
+        if not run.rig:
+            lost.setdefault("no rig quantity was recorded", []).append(run.plan.run)
+        elif run.plan.kind == "sweep":
+            samples += _bad_samples(run)
+            for reason in _missing(run):
+                lost.setdefault(reason, []).append(run.plan.run)
+        else:
+            bad = [name for name in ("Fz", "slip_angle", *FORCES) if _holds_nan(run, name)]
+            for name in bad:
+                lost.setdefault(f"{name} holds samples that are no number", []).append(run.plan.run)
+            for name in ("Fz", "slip_angle"):
+                if name not in run.rig:
+                    stood.setdefault(name, []).append(run.plan.run)
+        slips = run.plan.kind not in FREE_ROLLING
+        if slips and "slip_ratio" not in run.rig and not np.isfinite(run.plan.slip_ratio):
+            blank.setdefault("slip ratio", []).append(run.plan.run)
+        if "camber" not in run.rig and not np.isfinite(run.plan.camber):
+            blank.setdefault("camber", []).append(run.plan.run)
+    out = [f"{named(runs)}: {reason}; left out of the brush" for reason, runs in lost.items()]
+    if samples:
+        out.append(
+            f"{samples} samples of sweeps have no positive load or no slip angle, or are no "
+            "number; left out of the brush"
+        )
+    out += [
+        f"{named(runs)}: {name} was not measured; its set point is used"
+        for name, runs in stood.items()
+    ]
+    out += [f"{named(runs)}: {name} is unknown and taken as zero" for name, runs in blank.items()]
+    return tuple(out)
+
+
+def _missing(run: Run) -> list[str]:
+    """Return why a sweep as a whole says nothing."""
+    return [f"{name} is not recorded" for name in ("Fz", "slip_angle") if name not in run.rig]
+
+
+def _bad_samples(run: Run) -> int:
+    """Return how many samples of a sweep are left out."""
+    if _missing(run):
+        return 0
+    load, angle = run.rig["Fz"], run.rig["slip_angle"]
+    good = np.isfinite(load) & (load > 0.0) & np.isfinite(angle)
+    return int((~good).sum())
+
+
+def _holds_nan(run: Run, name: str) -> bool:
+    samples = run.rig.get(name)
+    return samples is not None and samples.size > 0 and not bool(np.isfinite(samples).all())

@@ -1,0 +1,240 @@
+"""Identify the brush of a tire from the forces of a campaign."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from tirelib.campaign import Campaign
+from tirelib.core.arrays import IntArray
+from tirelib.core.errors import TirelibError
+from tirelib.core.forked import forked
+from tirelib.core.parameters import Number, Tire
+from tirelib.core.threads import one_thread
+from tirelib.inference.identify.brush_advice import advice
+from tirelib.inference.identify.brush_estimates import SlipStiffness, estimates_of, slip_stiffness
+from tirelib.inference.identify.brush_fit import BrushFit, fit_brush
+from tirelib.inference.identify.brush_model import stored_number
+from tirelib.inference.identify.brush_study import study_of
+from tirelib.inference.identify.estimate import Estimate
+from tirelib.inference.identify.force_checks import ANGLE_SPAN
+from tirelib.inference.identify.force_data import ForceData, force_data
+from tirelib.inference.identify.force_notes import force_notes
+from tirelib.inference.identify.lateral_force import (
+    MOST_POINTS,
+    PressureComparison,
+    cells_of_load,
+    compare_pressures,
+)
+
+MOST_SAMPLES = 50000
+"""A longer sweep is thinned evenly: its samples are closer than its errors are independent."""
+MOST_COMPARED = 300
+"""Points for the ring's pressure against the parabola; each has its own pressure profile."""
+LEAST_COMPARED = 4
+"""Points of one load and pressure from which its stiffness can be fitted and points left out."""
+_STILL = 0.01
+"""Slip ratio up to which a point rolls freely."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceIdentification:
+    """What the forces of a campaign say of a tire.
+
+    Attributes
+    ----------
+    fit : BrushFit
+    estimates : tuple of Estimate
+    stiffness : tuple of SlipStiffness
+        By load and pressure.
+    comparison : PressureComparison or None
+        Lateral force by the ring's pressure against the parabola; without a ring none.
+    notes : tuple of str
+        What was left out or assumed, and why.
+    numbers : mapping of str to Number
+        As a tire file holds them.
+    """
+
+    fit: BrushFit
+    estimates: tuple[Estimate, ...]
+    stiffness: tuple[SlipStiffness, ...]
+    comparison: PressureComparison | None
+    notes: tuple[str, ...]
+    numbers: Mapping[str, Number]
+
+
+@one_thread()
+def identify_forces(
+    campaign: Campaign,
+    ring: Tire | None = None,
+    *,
+    progress: Callable[[str], None] | None = None,
+) -> ForceIdentification:
+    """Fit the brush to the forces of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    ring : Tire, optional
+        Gives the contact length; without it Mz does, or it is assumed and flagged.
+    progress : callable, optional
+        Called with a label at each step.
+
+    Raises
+    ------
+    CalibrationError
+        If slips, loads or forces do not suffice; with what is missing.
+    """
+    tell = progress or (lambda label: None)
+    tell("reading forces")
+    data, notes = _read(campaign)
+    if len(data) > MOST_SAMPLES:
+        step = -(-len(data) // MOST_SAMPLES)
+        notes.append(f"{len(data)} samples: each {step}. is used, {-(-len(data) // step)} in all")
+        data = data.take(np.arange(0, len(data), step))
+    if ring is not None:
+        data, ring = _with_pressure(data, ring, notes)
+    tell("fitting the brush")
+    fit = fit_brush(data, tire=ring)
+    tell("intervals of the brush")
+    study = study_of(fit, data)
+    estimates = estimates_of(study, free_radius=campaign.header.tire.free_radius)
+    if any("not_identifiable" in each.flags for each in estimates):
+        helps = advice(study)
+        estimates = tuple(
+            replace(each, helps=helps[each.name]) if "not_identifiable" in each.flags else each
+            for each in estimates
+        )
+    notes += _remarks(fit, estimates, data)
+    stiffness = slip_stiffness(study)
+    comparison = None
+    if ring is not None:
+        tell("ring pressure against the parabola")
+        comparison = _compared(data, ring, notes)
+    return ForceIdentification(
+        fit,
+        estimates,
+        stiffness,
+        comparison,
+        tuple(notes),
+        MappingProxyType(_numbers(campaign, fit, estimates, len(data))),
+    )
+
+
+def _read(campaign: Campaign) -> tuple[ForceData, list[str]]:
+    """Return the forces, and what of them cannot be used; both read every run."""
+    read: list[Callable[[], Any]] = [partial(force_data, campaign), partial(force_notes, campaign)]
+    data, notes = forked(read)
+    return data, list(notes)
+
+
+def _with_pressure(data: ForceData, ring: Tire, notes: list[str]) -> tuple[ForceData, Tire | None]:
+    """Return the points whose pressure is known, or all of them without the ring."""
+    known = np.isfinite(data.pressure)
+    if not known.any():
+        notes.append(
+            "the inflation pressure is known nowhere: the ring cannot give the contact length; "
+            "record the pressure, or give it as a set point"
+        )
+        return data, None
+    if not known.all():
+        notes.append(
+            f"{int((~known).sum())} of {known.size} points have no inflation pressure; left out, "
+            "since the ring needs it"
+        )
+        data = data.take(known)
+    return data, ring
+
+
+def _remarks(fit: BrushFit, estimates: tuple[Estimate, ...], data: ForceData) -> list[str]:
+    """Return what a reader should know of this fit."""
+    out = []
+    angles = np.unique(np.round(np.abs(np.rad2deg(data.slip_angle)), 1))
+    if "Fy" in fit.rmse and "Fx" not in fit.rmse and angles[angles > 0.3].size < 2:
+        out.append(
+            "one size of slip angle only: cornering stiffness and friction cannot be separated; "
+            "add a small and a large slip angle"
+        )
+    if fit.held.get("load_power", (0.0, ""))[1] == "one load only":
+        out.append(
+            f"one load only, {fit.reference.load:.0f} N: how the contact length follows the load "
+            "is unknown, so it is taken as constant; do not use this brush at other loads"
+        )
+    if "half_length" in fit.held and fit.tire is None:
+        out.append(
+            "the contact length is assumed, since neither Mz nor a ring determines it: the product "
+            "c_py a^2, which gives the cornering stiffness, is known, c_py alone is not"
+        )
+    if any("beyond_geometry" in each.flags for each in estimates):
+        out.append(
+            "half_length is longer than any contact of this tire: Mz is larger than a brush on a "
+            "rigid carcass explains. Forces do not depend on it; do not read it as a contact length"
+        )
+    if not np.isfinite(data.pressure).any():
+        out.append("the inflation pressure is unknown: the brush holds at the pressure of the test")
+    return out
+
+
+def _compared(data: ForceData, ring: Tire, notes: list[str]) -> PressureComparison | None:
+    usable = np.isfinite(data.Fy) & (np.abs(data.slip_ratio) <= _STILL)
+    chosen = np.flatnonzero(usable)
+    if not chosen.size or np.ptp(data.slip_angle[chosen]) < ANGLE_SPAN:
+        notes.append(
+            "ring pressure against parabola: no freely rolling runs over slip angle with Fy"
+        )
+        return None
+    chosen = _told(data, chosen, notes)
+    if not chosen.size:
+        return None
+    limit = min(MOST_COMPARED, MOST_POINTS)
+    if chosen.size > limit:
+        chosen = chosen[:: -(-chosen.size // limit)]
+    try:
+        return compare_pressures(data.take(chosen), ring)
+    except TirelibError as error:
+        notes.append(f"ring pressure against parabola: {error}")
+        return None
+
+
+def _told(data: ForceData, chosen: IntArray, notes: list[str]) -> IntArray:
+    """Return the points whose load and pressure hold enough slip angles for a stiffness."""
+    cell = cells_of_load(data.take(chosen))
+    enough = np.array(
+        [
+            np.count_nonzero(cell == k) >= LEAST_COMPARED
+            and np.ptp(data.slip_angle[chosen[cell == k]]) >= ANGLE_SPAN
+            for k in range(int(cell.max()) + 1)
+        ]
+    )[cell]
+    if not enough.all():
+        notes.append(
+            f"ring pressure against parabola: {int((~enough).sum())} of {enough.size} points are "
+            f"left out, their load and pressure hold fewer than {LEAST_COMPARED} points or less "
+            f"than {np.rad2deg(ANGLE_SPAN):.0f} deg of slip angle"
+        )
+    return np.asarray(chosen[enough])
+
+
+def _numbers(
+    campaign: Campaign, fit: BrushFit, estimates: tuple[Estimate, ...], points: int
+) -> dict[str, Number]:
+    """Return the brush as numbers of a tire file."""
+    source = f"forces of {campaign.header.name}, {' and '.join(fit.rmse)} at {points} points"
+    pairs = []
+    for each in estimates:
+        pairs.append(stored_number(each.name, each.value, each.std, "fitted", source, each.notes))
+    for name, (value, why) in fit.held.items():
+        if name == "half_length" and fit.tire is not None:
+            continue
+        pairs.append(stored_number(name, value, float("nan"), "assumed", f"not fitted: {why}"))
+    numbers = dict(pairs)
+    mean = f"median of the points of {campaign.header.name}"
+    numbers["reference_load"] = Number(fit.reference.load, float("nan"), "measured", mean)
+    if np.isfinite(fit.reference.pressure):
+        numbers["reference_pressure"] = Number(
+            fit.reference.pressure, float("nan"), "measured", mean
+        )
+    return numbers

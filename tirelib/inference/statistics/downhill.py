@@ -1,0 +1,73 @@
+"""A step of a fit that lowers the cost as its slopes promise, or a shorter one that does."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import TirelibError
+from tirelib.inference.statistics.problem import Model, Point
+from tirelib.inference.statistics.quadratic import Quadratic
+
+LEAST_FALL = 0.1
+"""Share of what a step promises that it has to bring, or a shorter one is tried."""
+GOOD = 0.5
+"""Share below which the next step is damped."""
+FIRST = 0.1
+"""Damping to begin with, relative to the curvature by each coordinate."""
+LONGEST = 1.0
+"""Longest move of a coordinate in one step."""
+HARDEST = 1e4
+"""Damping at which there is no way down."""
+
+Whiten = Callable[[FloatArray], FloatArray]
+"""Turns rows (k, ...) into whitened ones (k, n)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lower:
+    """A point with a lower cost: whitened residual, longest move in deviations, next damping."""
+
+    point: Point
+    solved: Any
+    rest: FloatArray
+    cost: float
+    moved: float
+    damping: float
+
+
+def downhill(
+    problem: Model, here: Quadratic, point: Point, solved: Any, whiten: Whiten, damping: float
+) -> Lower | None:
+    """Return a point whose cost is lower as promised, by ever shorter steps; None if none is."""
+    while damping < HARDEST:
+        dz = here.step(damping)
+        share = min(1.0, LONGEST / float(np.abs(dz).max()))
+        tried = _tried(problem, point, share * dz, solved)
+        if tried is not None:
+            rest = whiten(tried[1].rest)
+            cost = here.cost_at(tried[0].coordinates, rest)
+            brought = (here.cost - cost) / (share * here.fall(dz))
+            if brought > LEAST_FALL:
+                moved = share * float(np.abs(dz / here.deviation).max())
+                after = max(damping, FIRST) if brought < GOOD else 0.1 * damping
+                return Lower(*tried, rest, cost, moved, after)
+        damping = max(10.0 * damping, FIRST)
+    return None
+
+
+def _tried(problem: Model, point: Point, dz: FloatArray, solved: Any) -> tuple[Point, Any] | None:
+    """Return the model a step away; None where it has no solution."""
+    k = len(point.base)
+    cuts = np.cumsum([e.components for e in point.effects])[:-1]
+    steps = np.split(dz[k:], cuts) if point.effects else []
+    strengths = tuple(
+        s + e.scale * d for s, e, d in zip(point.strengths, point.effects, steps, strict=True)
+    )
+    there = Point(point.base + dz[:k], point.effects, strengths)
+    try:
+        return there, problem.solve(there, solved)
+    except TirelibError:
+        return None

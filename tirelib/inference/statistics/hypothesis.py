@@ -1,0 +1,307 @@
+"""A hypothesis, that these effects and no other are missing, with its test.
+
+Its statistic is the largest standard score of anything beside it
+(`tirelib.inference.statistics.null`), each over what is usual of it on plain tires, by the family
+of plain tires that excuses most. A user's tire belongs to none of the families, and a test by what
+its own family shows would be too sure. So the p-value is calibrated on plain tires, with the
+hypothesis planted in the user's plan, each by the families other than its own. The rank of the
+user's statistic among a family's tires is a p-value; the largest over the families counts, so that
+a tire which differs from the known families no more than any of them does from the others is
+covered.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.core.arrays import FloatArray
+from tirelib.inference.statistics.null import OWN, PRIOR, Null, Products
+from tirelib.inference.statistics.plain import BASE, ROUGHLY, Family, View
+from tirelib.inference.statistics.posterior import Posterior
+from tirelib.inference.statistics.problem import Problem
+
+LAWS = (0.03, 0.1, 0.3)
+"""Relative standard deviations by which laws are off: a hypothesis stays if it does with any."""
+USUAL = 0.15
+"""That of most laws."""
+LOOSEST = 1.0
+"""That which is tried where a hypothesis is rejected: its laws are off by as much as themselves."""
+SLACK = 2.0
+"""Standard deviations by which a strength may leave its range, those of its law included."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hypothesis:
+    """A set of effects with its test.
+
+    Attributes
+    ----------
+    fit : Posterior
+    nulls : tuple of Null
+        Of every family.
+    plain : tuple of shape (n_tires,)
+        Statistic of each plain tire by the families other than its own, by family.
+    law : float
+        Relative standard deviation by which its laws are off.
+    looseness : float
+        By how much more laws have to be off for the hypothesis to stay: 1, or infinity if it is
+        rejected even with `LOOSEST`.
+    plausible : bool
+        Whether the strengths lie in their ranges.
+    likelihood : float
+        Largest log likelihood over the families, [nats].
+    rival : str
+        Effects of a hypothesis of as many effects that is likelier; empty where there is none.
+    p_rival : float
+        p-value of the likelihood ratio in favour of the rival
+        (`tirelib.inference.statistics.rival`).
+    """
+
+    fit: Posterior
+    nulls: tuple[Null, ...]
+    plain: tuple[FloatArray, ...]
+    law: float
+    looseness: float
+    plausible: bool
+    likelihood: float
+    rival: str = ""
+    p_rival: float = 1.0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return self.fit.names
+
+    @property
+    def null(self) -> Null:
+        """That of the family that excuses most."""
+        return _excusing(self.nulls)
+
+    @property
+    def scores(self) -> dict[str, float]:
+        """Standard score of everything beside the hypothesis."""
+        return dict(zip(self.null.names, self.null.scores.tolist(), strict=True))
+
+    @property
+    def statistic(self) -> float:
+        """The largest of them."""
+        return float(self.null.scores.max())
+
+    @property
+    def against(self) -> str:
+        """What has this score: a further effect, a group of shapes, or the law of an effect."""
+        return self.null.names[int(np.argmax(self.null.scores))]
+
+    @property
+    def p(self) -> float:
+        """p-value of the hypothesis: of the statistic, or of its rival if that is smaller."""
+        return min(self.p_of(self.statistic)[0], self.p_rival)
+
+    @property
+    def p_std(self) -> float:
+        """Standard deviation of the p-value, from the number of plain tires."""
+        return self.p_of(self.statistic)[1]
+
+    def p_of(self, statistic: float) -> tuple[float, float]:
+        """Return the p-value of a statistic among plain tires, and its standard deviation."""
+        p = float(_p(np.array([statistic]), self.plain)[0])
+        count = min(map(len, self.plain))
+        return p, max(float(np.sqrt(p * (1.0 - p) / count)), 1.0 / (count + 1))
+
+    def limit(self, alpha: float) -> float:
+        """Return the statistic from which on the p-value is at most alpha."""
+        return max(float(np.quantile(each, 1.0 - alpha, method="higher")) for each in self.plain)
+
+    def p_values(self, products: Products, given: str = "") -> FloatArray:
+        """Return the p-values of k residuals, (k,); arguments are those of `Null.scores_of`."""
+        return _p(_statistic(self.nulls, products, given), self.plain)
+
+
+def judged(
+    problem: Problem,
+    fit: Posterior,
+    families: Sequence[Family],
+    alpha: float,
+    *,
+    own_effects: int,
+) -> Hypothesis:
+    """Return a fitted hypothesis with its statistic and p-value.
+
+    Parameters
+    ----------
+    families : sequence of Family
+        At least two.
+    own_effects : int
+        How many of the fit's effects the model had already: they are part of it.
+    """
+    views = [fit.view(problem, own) for own in OWN]
+    rough = not all(effect.exact for effect in fit.effects)
+    usual, loose = (LAWS, (LOOSEST,)) if rough else ((USUAL,), ())
+    levels = {law: _likelihoods(views, fit, families, law) for law in usual}
+    likelihood = max(max(each) for each in levels.values())
+    laws = sorted(usual, key=lambda law: -max(levels[law]))
+    looseness = np.inf
+    for law in (*laws, *loose):
+        best = int(np.argmax(levels[min(law, LAWS[-1])]))
+        tested = _tested(fit, views, families, law, best)
+        nulls, plain = tested
+        stays = _p(np.array([_excusing(nulls).scores.max()]), plain)[0] > alpha
+        if law == laws[0] or (stays and law != LOOSEST):
+            kept = *tested, law
+        if stays:
+            looseness = max(law / LAWS[-1], 1.0)
+            break
+    return Hypothesis(fit, *kept, looseness, plausible(fit, own_effects), likelihood)
+
+
+def _null(view: View, fit: Posterior, family: Family, law: float) -> Null:
+    wide = fit.widths**2
+    wide[len(fit.point.base) :] *= PRIOR**2
+    allowed = {BASE: wide, **law_errors(fit, law, view)}
+    return Null(view, family, family.spread(fit.sizes), allowed, fit.sides)
+
+
+def _likelihoods(
+    views: Sequence[View], fit: Posterior, families: Sequence[Family], law: float
+) -> list[float]:
+    """Return the largest likelihood over the families for each size of a run's own misfit."""
+    return [max(_null(view, fit, family, law).likelihood for family in families) for view in views]
+
+
+def _tested(
+    fit: Posterior,
+    views: Sequence[View],
+    families: Sequence[Family],
+    law: float,
+    best: int,
+) -> tuple[tuple[Null, ...], tuple[FloatArray, ...]]:
+    """Return the tests by every family, and the statistics of plain tires by the others.
+
+    `best` is the likeliest size of a run's own misfit.
+    """
+    at = views[best]
+    nulls = tuple(_null(at, fit, family, law) for family in families)
+    plain = []
+    for family in families:
+        planted, noise = _drawn(fit, family, law_errors(fit, law, at), at.white.shape[1])
+        turned = _products(at, noise + planted @ at.white)  # whitened
+        plain.append([null.scores_of(turned) for null in nulls if null.family is not family])
+    every = np.concatenate([scores for each in plain for scores in each], axis=1)
+    mean, std = np.maximum(every.mean(axis=1), 0.0), np.maximum(every.std(axis=1), 1.0)
+    for null in nulls:
+        null.usual = mean, std
+    standing = ((np.array(each) - mean[:, None]) / std[:, None] for each in plain)
+    return nulls, tuple(np.min(each.max(axis=1), axis=0) for each in standing)
+
+
+def _excusing(nulls: Sequence[Null]) -> Null:
+    """Return the test by the family that excuses most of the user's residual."""
+    return min(nulls, key=lambda null: float(null.scores.max()))
+
+
+def _statistic(nulls: Sequence[Null], products: Products, given: str = "") -> FloatArray:
+    """Return the largest score of k residuals by the family that excuses most, (k,)."""
+    return np.asarray(np.min([n.scores_of(products, given).max(axis=0) for n in nulls], axis=0))
+
+
+def _p(statistic: FloatArray, plain: Sequence[FloatArray]) -> FloatArray:
+    """Return the largest rank of statistics (k,) among the tires of any family, as p-values."""
+    ranks = [
+        (1 + np.sum(tires[:, None] >= statistic, axis=0)) / (len(tires) + 1) for tires in plain
+    ]
+    return np.asarray(np.max(ranks, axis=0))
+
+
+def plain_tires(
+    problem: Problem,
+    fit: Posterior,
+    family: Family,
+    laws: Mapping[str, float | FloatArray],
+    own: float,
+) -> FloatArray:
+    """Return what a fitted hypothesis leaves of a family's plain tires in the user's plan.
+
+    The hypothesis' laws are off, and every run has a misfit of its own, as they are for the user.
+
+    Returns
+    -------
+    shape (n_tires, ...)
+    """
+    whiten, rows = problem.whitener(own), np.concatenate(list(fit.rows.values()))
+    planted, noise = _drawn(fit, family, laws, whiten(fit.rest).size)
+    return np.asarray(whiten.coloured(noise) + np.tensordot(planted, rows, axes=1))
+
+
+def _drawn(
+    fit: Posterior, family: Family, laws: Mapping[str, float | FloatArray], count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return coefficients of all rows for plain tires, (n_tires, m), and white noise (n_tires, n).
+
+    The errors of the hypothesis' laws are drawn with the given variances.
+    """
+    blocks, first = {}, 0
+    for name, each in fit.rows.items():
+        blocks[name] = slice(first, first + len(each))
+        first += len(each)
+    random = np.random.default_rng(list(family.name.encode()))
+    planted = family.on(blocks, first)
+    for name, variance in laws.items():
+        block = blocks[name]
+        size = (len(family), block.stop - block.start)
+        planted[:, block] += np.sqrt(variance) * random.standard_normal(size)
+    return planted, random.standard_normal((len(family), count))
+
+
+def products(problem: Problem, view: View, tires: FloatArray) -> Products:
+    """Return the products of residuals (k, ...) with the rows of a view."""
+    return _products(view, problem.whitener(view.own)(tires))
+
+
+def _products(view: View, white: FloatArray) -> Products:
+    return view.white @ white.T, np.sum(white**2, axis=1)
+
+
+def law_errors(fit: Posterior, law: float, view: View) -> dict[str, float | FloatArray]:
+    """Return variances by block where laws are off by a relative standard deviation.
+
+    They come on top of what plain tires show. A law's error has shapes of its own, and looks to
+    some extent like each other effect: by the problem's share of its size (`Model.lookalike`) in
+    what the base cannot take.
+    """
+    out: dict[str, float | FloatArray] = {
+        ROUGHLY + effect.name: law**2 for effect in fit.effects if not effect.exact
+    }
+    if out and fit.lookalike:
+        square, others = _beyond_base(fit, view)
+        out |= {name: (fit.lookalike * law) ** 2 * square / each for name, each in others.items()}
+    return out
+
+
+def _beyond_base(fit: Posterior, view: View) -> tuple[float, dict[str, float]]:
+    """Return the square of what the laws do that the base cannot take, and of other effects' rows.
+
+    The rows are of a strength of one range; an effect of which the base takes all is left out.
+    """
+    gram, first = view.normal.gram, len(fit.point.base)
+    base = gram[:first, :first] + np.diag(fit.widths[:first] ** -2)
+    left = gram - gram[:, :first] @ np.linalg.solve(base, gram[:first])
+    each = zip(fit.effects, fit.point.ranges, strict=False)
+    ranges = np.concatenate([np.where(effect.exact, 0.0, size) for effect, size in each])
+    here = slice(first, first + len(ranges))
+    others = {
+        effect.name: float(np.mean(np.diag(left)[view.normal.blocks[effect.name]]))
+        for effect in fit.point.effects[fit.count :]
+    }
+    return float(ranges @ left[here, here] @ ranges), {k: v for k, v in others.items() if v > 0.0}
+
+
+def plausible(fit: Posterior, own_effects: int) -> bool:
+    """Return whether the strengths of the further effects lie in their ranges."""
+    for k, effect in enumerate(fit.effects):
+        slack = SLACK * np.hypot(fit.std(k), USUAL * np.linalg.norm(fit.strengths[k]))
+        low, high = effect.low - slack, effect.high + slack
+        inside = (fit.strengths[k] >= low) & (fit.strengths[k] <= high)
+        if k >= own_effects and not inside.all():
+            return False
+    return True

@@ -1,0 +1,322 @@
+"""What stands beside a fitted hypothesis, weighed by what plain tires of one family show.
+
+What may stand there - a further effect, more of a group of smooth shapes, or a law of the
+hypothesis that is further off than laws are - gains the likelihood ratio
+
+    L_j = 2 [max over k of log p(r | H, a_j, k) - max over k of log p(r | H, k)],
+
+a_j at its likeliest with its prior, k the size of what this tire shows of everything and that of
+the misfit which each run has for itself. Were the model of plain tires exact, L_j would be a chi-
+square of as many degrees of freedom n_j as a_j has components; the cube root makes chi-squares of
+different n_j comparable (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684). The largest of
+these standard scores is what stands out. An effect whose range lies on one side of zero may stand
+out on the other one: then something else is there. The model of plain tires is not exact: how large
+scores get on plain tires is measured (`tirelib.inference.statistics.hypothesis`), for each j by
+itself, and every score is held against its own distribution (Westfall and Young, Resampling-Based
+Multiple Testing, 1993). Otherwise the groups of shapes that plain tires show most would set the
+limit for all.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from tirelib.core.arrays import FloatArray
+from tirelib.inference.statistics.normal import Weighed, beside, taken
+from tirelib.inference.statistics.plain import BASE, LARGEST, ROUGHLY, Family, View
+
+PRIOR = 0.5
+"""Standard deviation of a further effect's strength, in ranges."""
+MORE = 8.0
+"""Variance of a group of shapes beyond that of plain tires, over theirs."""
+OPPOSITE = 0.5
+"""What a score counts on the side of zero where the effect's range is not, as sidewalls that harden
+where they are pressed: something else is there, which plain tires show more often than an effect
+and which gets no name. Half and double of it: docs/theory/verdict_numbers.md."""
+SIZES = 2.0 ** np.arange(-2, 2)
+"""Sizes of what one tire shows over what its family shows, among which its likelihood chooses. A
+tire that leaves little shows a weak effect; one that leaves far more than its family has something
+unknown, so that twice as much is the most that is excused."""
+APART = (0.5, 1.0, 2.0)
+"""Size of what one tire shows away from the contact over that in it: where it leaves little in
+the contact, and as much as others on the free belt, the free belt does not stand out."""
+SIZE_STD = 1.5
+"""Standard deviation of the logarithm of this size."""
+OWN = tuple(0.0005 * 2.0 ** np.arange(6))
+"""Sizes of the misfit that each run has for itself, over its rms strain, among which its likelihood
+chooses."""
+
+FREE = ", free belt"
+"""End of the name of shapes that stand away from the contact."""
+
+Products = tuple[FloatArray, FloatArray]
+"""B r, (m, k), and r' r, (k,), of k residuals r."""
+
+
+class Size(NamedTuple):
+    """How much one tire shows over what its family shows, in general and away from the contact."""
+
+    whole: float
+    free: float
+
+    def of(self, block: str) -> float:
+        """Return the size of a block: of an effect it is at most `LARGEST`."""
+        if "," not in block:
+            return min(self.whole, LARGEST)
+        return self.free if block.endswith(FREE) else self.whole
+
+    @property
+    def log_prior(self) -> float:
+        """Log density, up to a constant."""
+        return float(-0.125 * (np.log(self.whole * self.free) / SIZE_STD) ** 2)
+
+
+class Null:
+    """A fitted hypothesis among the plain tires of one family.
+
+    Parameters
+    ----------
+    view : View
+        Normal equations about the fit.
+    family : Family
+    shown : mapping of block to variance
+        What its tires show in the plan (`Family.spread`).
+    allowed : mapping of block to variance
+        What the hypothesis leaves open in addition to that.
+    sides : mapping of block to sign
+        Effects of one number whose range lies on this side of zero.
+
+    Attributes
+    ----------
+    names : list of str
+        Of everything that may be there in addition to the hypothesis.
+    counts : shape (n_names,)
+        Components n_j of each.
+    usual : (shape (n_names,), shape (n_names,))
+        Mean and standard deviation of each score on plain tires, where they are more than 0 and 1.
+    """
+
+    def __init__(
+        self,
+        view: View,
+        family: Family,
+        shown: Mapping[str, float],
+        allowed: Mapping[str, float | FloatArray],
+        sides: Mapping[str, float],
+    ) -> None:
+        blocks = view.normal.blocks
+        self.view, self.family, self.shown, self.allowed = view, family, shown, allowed
+        self.sides = sides
+        self.names = [name for name in blocks if name != BASE]
+        self.blocks = [blocks[name] for name in self.names]
+        self.counts = np.array([block.stop - block.start for block in self.blocks], dtype=float)
+        self.usual = np.zeros(len(self.names)), np.ones(len(self.names))
+        self._weighed = []
+        for size in _sizes(family.largest, shown):
+            variance = {name: size.of(name) ** 2 * each for name, each in shown.items()}
+            spread = view.normal.spread(variance) + view.normal.spread(allowed)
+            means = {name: size.of(name) * each for name, each in family.means.items()}
+            self._weighed.append((size, Weighed(view.normal.about(means), spread)))
+
+    @cached_property
+    def _levels(self) -> FloatArray:
+        """The log likelihood at every size, [nats]."""
+        each = [w.log_likelihood() + size.log_prior for size, w in self._weighed]
+        return self.view.log_volume + np.array(each)
+
+    @property
+    def likelihood(self) -> float:
+        """The largest log likelihood over the sizes, [nats]."""
+        return float(self._levels.max())
+
+    @property
+    def likeliest(self) -> Weighed:
+        """The normal equations at the likeliest sizes."""
+        return self._weighed[int(np.argmax(self._levels))][1]
+
+    def ratios_of(self, products: Products, *, given: int | None = None) -> FloatArray:
+        """Return L_j / n_j of k residuals, (n_names, k); negative on the side of no effect's range.
+
+        Parameters
+        ----------
+        products : (shape (m, k), shape (k,))
+        given : int, optional
+            Place of a further effect that the hypothesis counts with.
+        """
+        sided = [
+            (self.names.index(name), side)
+            for name, side in self.sides.items()
+            if name in self.names
+        ]
+        rows = [j for j, _ in sided]
+        first, side = [self.blocks[j].start for j in rows], np.array([each for _, each in sided])
+        plain, free, signs = [], [], []
+        for level, weighed, left in self._at(products):
+            gram, here = weighed.gram, weighed.right(left)
+            if given is not None:
+                block, more = self.blocks[given], self._more(given, weighed)
+                level = level + taken(gram, here, block, more)
+                gram, here = beside(gram, here, block, more)
+            plain.append(level)
+            free.append(
+                [
+                    level + taken(gram, here, block, self._more(j, weighed))
+                    for j, block in enumerate(self.blocks)
+                ]
+            )
+            signs.append(here[first] * side[:, None] >= 0.0)
+        best = np.argmax(free, axis=0)[None]
+        gain = np.take_along_axis(np.array(free), best, axis=0)[0] - np.max(plain, axis=0)
+        ratios = np.asarray(2.0 * gain / self.counts[:, None])
+        inside = np.ones(ratios.shape, dtype=bool)
+        inside[rows] = np.take_along_axis(np.array(signs), best[:, rows], axis=0)[0]
+        return np.where(inside, ratios, -ratios)
+
+    def likelihood_of(self, products: Products) -> FloatArray:
+        """Return the largest log likelihood of k residuals over the sizes, (k,), [nats]."""
+        return np.asarray(np.max([level for level, _, _ in self._at(products)], axis=0))
+
+    def _at(self, products: Products) -> Iterator[tuple[FloatArray, Weighed, FloatArray]]:
+        """Yield the log likelihood (k,) at every size, the metric, and B r less the means' part."""
+        right, square = products
+        for size, weighed in self._weighed:
+            mean, gram = weighed.normal.mean, self.view.normal.gram
+            left = right - (gram @ mean)[:, None]
+            rest = self.view.log_volume - 0.5 * (square - mean @ (right + left)) + size.log_prior
+            yield weighed.gain(left) + rest, weighed, left
+
+    def _more(self, j: int, weighed: Weighed) -> FloatArray:
+        """Return the variance of a block beyond that of plain tires."""
+        block = self.blocks[j]
+        if "," in self.names[j] or self.names[j].startswith(ROUGHLY):
+            return np.asarray(MORE * weighed.root[block] ** 2)
+        return np.full(block.stop - block.start, PRIOR**2)
+
+    @property
+    def size(self) -> "Size":
+        """The likeliest size of what this tire shows over what its family shows."""
+        return self._weighed[int(np.argmax(self._levels))][0]
+
+    def about(self, view: View, size: "Size | None" = None) -> "Null":
+        """Return the same test of other normal equations, at one size of what the tire shows."""
+        other = Null(view, self.family, self.shown, self.allowed, self.sides)
+        other.usual = self.usual
+        if size is not None:
+            other._weighed = [each for each in other._weighed if each[0] == size]
+        return other
+
+    def scores_of(self, products: Products, given: str = "") -> FloatArray:
+        """Return the standard scores of k residuals, (n_names, k).
+
+        With a further effect `given`, the hypothesis counts with it, and its score is that of
+        nothing.
+        """
+        j = self.names.index(given) if given else None
+        scores = self.standard(self.ratios_of(products, given=j))
+        if j is not None:
+            scores[j] = -np.inf
+        return scores
+
+    def standard(self, ratios: FloatArray) -> FloatArray:
+        """Return the standard scores of signed L_j / n_j, (n_names, k)."""
+        scores = standard(np.abs(ratios), self.counts[:, None])
+        scores = np.where((ratios < 0.0) & (scores > 0.0), OPPOSITE * scores, scores)
+        mean, std = self.usual
+        return np.asarray((scores - mean[:, None]) / std[:, None])
+
+    @property
+    def scores(self) -> FloatArray:
+        """The standard score of everything beside the hypothesis, (n_names,)."""
+        return self.standard(self._ratios)[:, 0]
+
+    @cached_property
+    def _ratios(self) -> FloatArray:
+        """L_j / n_j of the user's residual, (n_names, 1)."""
+        return self.ratios_of(self.measured)
+
+    @property
+    def measured(self) -> Products:
+        """Products of the user's residual."""
+        normal = self.view.normal
+        return normal.right[:, None], np.array([normal.square])
+
+    def left(self, names: Sequence[str]) -> dict[str, float]:
+        """Return the largest standard score of anything else, with each further effect fitted."""
+        return {name: float(self.scores_of(self.measured, name).max()) for name in names}
+
+    def explained(self) -> FloatArray:
+        """Return coefficients of all rows by the hypothesis and what plain tires show, (m,)."""
+        normal = self.likeliest.normal
+        return normal.mean + self.likeliest.mean(normal.right)
+
+    def beside(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Return what a further effect or more of a group takes, and its covariance.
+
+        Shapes (n,) and (n, n): coefficients of the rows of that name, beyond what plain tires show.
+        """
+        weighed, j = self.likeliest, self.names.index(name)
+        block = self.blocks[j]
+        inner = weighed.gram[block, block] + np.diag(1.0 / self._more(j, weighed))
+        covariance = np.asarray(np.linalg.inv(inner), dtype=float)
+        return covariance @ weighed.right(weighed.normal.right)[block], covariance
+
+    def moved(self, name: str) -> FloatArray:
+        """Return how coefficients of all rows move, (m,), if a further effect is there.
+
+        Those of the effect itself (or of more of a group) are from zero.
+        """
+        weighed, right = self.likeliest, self.likeliest.normal.right
+        block, spread = self.blocks[self.names.index(name)], weighed.root**2
+        spread[block] += self._more(self.names.index(name), weighed)
+        after, before = Weighed(self.view.normal, spread).mean(right), weighed.mean(right)
+        before[block] = -self.likeliest.normal.mean[block]
+        return after - before
+
+    def angle(self, one: str, other: str) -> float:
+        """Return the smallest angle between two effects' signatures as this test weighs them.
+
+        It is a right angle where one of them does nothing to the fitted model.
+        """
+        a, b = (self.blocks[self.names.index(name)] for name in (one, other))
+        gram = self.likeliest.gram
+        inner = _orthonormal(gram[a, a]).T @ gram[a, b] @ _orthonormal(gram[b, b])
+        cosine = float(np.linalg.norm(inner, 2)) if inner.size else 0.0
+        return float(np.arccos(min(cosine, 1.0)))
+
+    def power(self, name: str, strength: float, limit: float) -> float:
+        """Return the chance that an effect of so many ranges has a score beyond a limit."""
+        j = self.names.index(name)
+        _, covariance = self.beside(name)
+        count = self.counts[j]
+        spread = 2.0 / (9.0 * count)
+        mean, std = self.usual
+        least = limit * std[j] + mean[j]
+        least = max(least * np.sqrt(spread) + 1.0 - spread, 0.0) ** 3 * count
+        size = strength**2 / float(np.mean(np.diag(covariance)))
+        return float(stats.ncx2.sf(least, count, size))
+
+
+def standard(ratio: FloatArray, count: FloatArray) -> FloatArray:
+    """Return the normal score of a mean square of `count` numbers over its expectation."""
+    spread = 2.0 / (9.0 * count)
+    return np.asarray((np.cbrt(np.maximum(ratio, 0.0)) - (1.0 - spread)) / np.sqrt(spread))
+
+
+def _orthonormal(gram: FloatArray) -> FloatArray:
+    """Return coefficients (n, rank) of rows with these products that make them orthonormal."""
+    values, vectors = np.linalg.eigh(gram)
+    kept = values > len(values) * np.finfo(float).eps * values[-1]
+    return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
+
+
+def _sizes(largest: float, blocks: Iterable[str]) -> list[Size]:
+    """Return `SIZES`, and further ones up to the largest of a family's tires."""
+    whole: list[float] = SIZES.tolist()
+    while whole[-1] < largest:
+        whole.append(2.0 * whole[-1])
+    apart = APART if any(FREE in name for name in blocks) else (1.0,)
+    each = [Size(size, size * share) for size in whole for share in apart]
+    return [size for size in each if whole[0] <= size.free <= whole[-1]]
