@@ -101,7 +101,7 @@ def camber_and_gages() -> plt.Figure:
     for row, axes in enumerate(FLIPPED):
         height = 2.6 - 1.2 * row
         right.plot([-80, 80], [height, height], color=GREY, lw=6, alpha=0.3)
-        for place, y in enumerate((60, 30, 0, -30, -60)):
+        for place, y in enumerate((-60, -30, 0, 30, 60)):
             at = -y * sign("lateral", axes)  # drawn from behind: left of the vehicle is left
             right.plot(at, height, "s", color=RED)
             right.text(at, height + 0.17, f"{place + 1}", ha="center", color=RED)

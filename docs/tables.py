@@ -25,31 +25,41 @@ ORDER = (
 )
 """Tutorials in the order of a first hour."""
 SCHEMAS = Path(__file__).parent / "reference/schemas"
-LATERAL = (0.06, 0.03, 0.0, -0.03, -0.06)
+LATERAL = (-0.06, -0.03, 0.0, 0.03, 0.06)
+"""Gages in the order of the numerical rig, from right to left."""
 REMEDIES = {
     "FIRST_TURN": "Nothing: from the second turn on there are estimates.",
-    "GAP": "Look at the losses of the line (`line` in the JSON of the bench), and at the rate.",
-    "BRIDGED": "Nothing; if it comes often, look at the line as for a gap.",
+    "GAP": "Look at the losses of the line (`line` in the JSON of the bench), and at the rate; in"
+    " an FMU at `frame_valid`, and whether the host steps longer than a frame.",
+    "BRIDGED": "Nothing; if it comes often, look at the line, or at the host's step, as for a gap.",
     "SPIKE": "Nothing if rare; else look for a loose contact or interference.",
-    "SATURATED": "Lower the gain of the amplifier, or zero the gage again (`tirebench zero`).",
-    "DEAD_GAGE": "Look at the wiring of the gage named; estimates go on without one outer gage.",
-    "PERIOD_JUMP": "Nothing after a stop or a lock; else the contacts of this turn were misread.",
+    "SATURATED": "Lower the gain of the amplifier, or zero the gage again (`tirebench zero`); in "
+    "an FMU check the unit of the strain (1, not microstrain).",
+    "DEAD_GAGE": "Look at the wiring of the gage (in an FMU the one whose `contact_length` is "
+    "NaN); estimates go on without one outer gage.",
+    "PERIOD_JUMP": "Nothing after a stop or a lock; else the contacts of this turn were misread: "
+    "check `sample_rate`, and that the host does not step longer than a frame.",
     "TRIGGER_MISMATCH": "Look at the trigger's sensor; the contacts are found in the strain.",
-    "OMEGA_MISMATCH": "Give the turn rate in rad/s, of this wheel, positive forward; or omit it.",
+    "OMEGA_MISMATCH": "Give the turn rate in rad/s, of this wheel, positive forward, or omit it; "
+    "if it is right, check `sample_rate` and the unit of the strain.",
     "DRIFT": "Let the gages warm up, or zero them again; look at the glue.",
     "NO_SPEED": "Give the travel speed (`--speed`, input `speed`); without it there is no kappa.",
-    "REVERSED": "Drive forward, or turn the sign of the speed: calibrations hold forward only.",
-    "OUT_OF_RANGE": "Check the unit of what a note names; else calibrate where you measure.",
-    "CUT_OFF": "Leave out `--cut-off`, or raise the sample rate of the gages.",
+    "REVERSED": "Drive forward, or turn the sign of the speed (positive in all axes): "
+    "calibrations hold forward only.",
+    "OUT_OF_RANGE": "Check the unit of what a note, or the log of an FMU, names; else calibrate "
+    "there.",
+    "CUT_OFF": "Leave out `--cut-off`, or raise the sample rate of the gages (`sample_rate`).",
     "REDUCED_GAGES": "Repair the gage; until then intervals are those without it.",
     "TOO_FEW_GAGES": "Repair the gages: the centre gage and all but one of the others are needed.",
     "NO_CONDITION": "Give pressure, camber and speed: the calibration varied what is missing.",
     "WEAK_EDGE": "Look at the load: at very low loads the contact has no clear edges.",
-    "NO_CONTACT": "The wheel stands, or the gages are dead or frozen.",
+    "NO_CONTACT": "The wheel stands, or the gages are dead, frozen or not connected; in an FMU "
+    "also: frames are not valid, read the `status` of `VirtualTire.fmu`.",
     "FAULT": "Read the log, and report it: this is an error of the estimator.",
     "OTHER_TIRE": "Use the calibration of the tire on the wheel; check pressure, tread and the "
-    "order of the gages.",
-    "ACCELERATING": "Give the turn rate of the wheel (`omega`), from a speed sensor or the rig.",
+    "order of the gages (`lateral_m` of the calibration).",
+    "ACCELERATING": "Give the turn rate of the wheel (input `omega`), from a speed sensor, the "
+    "rig or the vehicle.",
 }
 """What to do about a flag; `tests/unit/test_documentation.py` asks for one for each."""
 
