@@ -6,14 +6,22 @@ process.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import pythonfmu
 from pythonfmu import Fmi2Slave
 
 from tirelib.core.held import HELD
+from tirelib.fmu.remarks import strain_remark
 from tirelib.fmu.slave import GuardedSlave
 from tirelib.fmu.variables import MISSING, Variable, inputs, outputs, parameters
-from tirelib.fmu.wheel import Wheel, check_missing, embedded_calibration, load_wheel
+from tirelib.fmu.wheel import (
+    Wheel,
+    check_missing,
+    embedded_calibration,
+    load_wheel,
+    read_other,
+)
 from tirelib.stream.estimator import RATES
 
 
@@ -24,6 +32,7 @@ class StrainTire(GuardedSlave, Fmi2Slave):
 
     def table(self) -> list[Variable]:
         """Return the variables; note where the frame, the conditions and the age stand."""
+        self._read_once = lru_cache(maxsize=1)(read_other)
         self._samples = int(self.settings["samples_per_step"])
         self._buffered = bool(self.settings["buffered"])
         lateral = embedded_calibration(self.folder / "calibration.toml").lateral
@@ -31,7 +40,8 @@ class StrainTire(GuardedSlave, Fmi2Slave):
         given = inputs(lateral, self._samples, buffered=self._buffered)
         taken = outputs(lateral)
         self._missing = [v.name for v in fixed].index(MISSING)
-        first, strains = len(fixed), self._samples * len(lateral)
+        self._gages = len(lateral)
+        first, strains = len(fixed), self._samples * self._gages
         self._frame = slice(first, first + strains)
         self._conditions = slice(first + strains, first + strains + len(HELD))
         self._omega = first + strains + HELD.index("omega")
@@ -49,15 +59,17 @@ class StrainTire(GuardedSlave, Fmi2Slave):
             str(self.other["axes"]),
             tire=str(self.other["tire"]),
             order=self.real[self.reference["filter_order"]],
+            read=self._read_once,
         )
 
     def advance(self, step: float) -> bool:
         """Push the frame; tell what is out of range; between estimates only the age changes."""
         real, wheel = self.real, self.model
         count = self.other["samples"] if self._buffered else None
-        changed: bool = wheel.step(
-            real[self._frame], step, self.other["frame_valid"], *real[self._conditions], count=count
-        )
+        frame, valid = real[self._frame], self.other["frame_valid"]
+        changed: bool = wheel.step(frame, step, valid, *real[self._conditions], count=count)
+        for kind, remark in strain_remark(frame[: self._gages] if valid else ()).items():
+            self.remark(kind, remark.text(kind))
         if wheel.ended:
             for kind, remark in wheel.remarks(real[self._omega]).items():
                 self.remark(kind, remark.text(kind))

@@ -109,8 +109,8 @@ def _bindings(structure: Path) -> dict[str, list[str]]:
     }
 
 
-def run_fmpy(path: Path, step: float, steps: int) -> Result:
-    """Run by instances of FMPy."""
+def run_fmpy(path: Path, step: float, steps: int, watched: Sequence[str] = WATCHED) -> Result:
+    """Run by instances of FMPy; only its record can be of other variables."""
     system = read_ssd(str(path)).system
     with tempfile.TemporaryDirectory() as name, zipfile.ZipFile(path) as archive:
         archive.extractall(name)
@@ -134,7 +134,7 @@ def run_fmpy(path: Path, step: float, steps: int) -> Result:
             for instance in made.values():
                 instance.slave.doStep(index * step, step)
 
-        result = _record(steps, advance, lambda n: made[_split(n)[0]].get(_split(n)[1]))
+        result = _record(steps, advance, lambda n: made[_split(n)[0]].get(_split(n)[1]), watched)
         for instance in made.values():
             instance.slave.freeInstance()
     return result
@@ -192,12 +192,17 @@ def run_libcosim(path: Path, step: float, steps: int) -> Result:
     return _record(steps, advance, read)
 
 
-def _record(steps: int, advance: Callable[[int], Any], read: Callable[[str], float]) -> Result:
-    rows = np.empty((steps, len(WATCHED)))
+def _record(
+    steps: int,
+    advance: Callable[[int], Any],
+    read: Callable[[str], float],
+    watched: Sequence[str] = WATCHED,
+) -> Result:
+    rows = np.empty((steps, len(watched)))
     for index in range(steps):
         advance(index)
-        rows[index] = [read(name) for name in WATCHED]
-    return {name: rows[:, i] for i, name in enumerate(WATCHED)}
+        rows[index] = [read(name) for name in watched]
+    return {name: rows[:, i] for i, name in enumerate(watched)}
 
 
 ENGINES: dict[str, Callable[[Path, float, int], Result]] = {

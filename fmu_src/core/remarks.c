@@ -7,6 +7,8 @@
 
 static int beyond(double x, double low, double high) { return x < low || x > high; }
 
+static const double MOST_STRAIN = 1.0;
+
 static Remark remark_of(double value, double low, double high, int name) {
     Remark r = {1, name, value, fmin(low, high), fmax(low, high)};
     return r;
@@ -92,4 +94,12 @@ void wheel_remarks(const Wheel *w, double omega, Remark r[REMARKS]) {
     if (any(r) || !out || !c) return;
     own(w, c, out, r);
     if (!any(r)) of_strain(w, c, out, r);
+}
+
+Remark strain_remark(const double *sample, int gages) {
+    Remark none = {0, 0, 0.0, 0.0, 0.0};
+    for (int g = 0; g < gages; g++)
+        if (isfinite(sample[g]) && fabs(sample[g]) > MOST_STRAIN)
+            return remark_of(sample[g], -MOST_STRAIN, MOST_STRAIN, 0);
+    return none;
 }

@@ -20,6 +20,7 @@ enum {
     STRAIN_REMARK,
     COMBINATION_REMARK,
     OTHER_TIRE_REMARK,
+    IMPLAUSIBLE_REMARK,
     REMARKS
 };
 
@@ -32,5 +33,8 @@ typedef struct {
 /* What holds for the last turn of a wheel to which the turn rate `omega` is given now.
  * Reference: remarks; test: test_native_fmu. */
 void wheel_remarks(const Wheel *wheel, double omega, Remark remark[REMARKS]);
+
+/* What cannot be strain in a sample of all gages. Reference: strain_remark; test: test_remarks. */
+Remark strain_remark(const double *sample, int gages);
 
 #endif

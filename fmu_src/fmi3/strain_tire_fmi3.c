@@ -16,7 +16,6 @@ typedef struct {
     fmi3LogMessageCallback log;
     int events; /* whether the importer handles them */
     int event_mode;
-    double time;
 } Instance;
 
 static void tell(const void *host, const char *name, const char *text, int warning) {
@@ -95,7 +94,7 @@ FMI3_EXPORT fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Bo
     Instance *c = instance;
     (void)a, (void)tolerance, (void)b, (void)stop;
     if (!c || slave_unstarted(c->slave)) return fmi3Error;
-    c->time = start;
+    c->slave->time = start;
     return fmi3OK;
 }
 
@@ -116,7 +115,6 @@ FMI3_EXPORT fmi3Status fmi3Reset(fmi3Instance instance) {
     if (!c) return fmi3Error;
     slave_reset(c->slave);
     c->event_mode = 0;
-    c->time = 0.0;
     return fmi3OK;
 }
 
@@ -131,7 +129,7 @@ FMI3_EXPORT fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 now, fmi3Fl
     if (c->event_mode)
         return (fmi3Status)slave_failed(c->slave, "a step in Event Mode; call enterStepMode first");
     if (slave_step(c->slave, step)) return fmi3Error;
-    *reached = c->time = now + step;
+    *reached = c->slave->time = now + step;
     if (c->events)
         *event = slave_turn(c->slave) != c->slave->announced;
     else
@@ -224,7 +222,7 @@ FMI3_EXPORT fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueRefe
     if (!c) return fmi3Error;
     Slave *s = c->slave;
     if (n == 1 && values == 1 && r[0] == s->count + 1) {
-        v[0] = c->time;
+        v[0] = s->time;
         return fmi3OK;
     }
     if (!allowed(s, r, n, values, 'R', 0)) return fmi3Error;

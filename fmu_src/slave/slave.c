@@ -1,5 +1,6 @@
 #include "slave.h"
 
+#include <fenv.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -62,8 +63,20 @@ int slave_refuse(Slave *s, const char *format, ...) {
     return slave_failed(s, "%s", s->cause);
 }
 
+/* Compute as C does at its start, whatever the importer set in this thread: NaN is a value here, so
+ * that no exception may trap, and rounding decides on flags. Returns what it had set. */
+static fenv_t computing(void) {
+    fenv_t host;
+    fegetenv(&host);
+    fesetenv(FE_DFL_ENV);
+    return host;
+}
+
 void slave_foresee(Slave *s) {
-    if (s->phase == INSTANTIATED && !s->refused && !s->running) s->model->foresee(s);
+    if (s->phase != INSTANTIATED || s->refused || s->running) return;
+    fenv_t host = computing();
+    s->model->foresee(s);
+    fesetenv(&host);
 }
 
 void slave_reset(Slave *s) {
@@ -72,8 +85,10 @@ void slave_reset(Slave *s) {
         s->whole[i] = 0;
     }
     memset(s->text, 0, sizeof s->text);
+    memset(s->loaded, 0, sizeof s->loaded);
     s->phase = INSTANTIATED;
     s->refused = s->announced = s->running = 0;
+    s->time = 0.0;
     s->causes = s->remarked = 0;
     s->model->first(s);
 }
@@ -92,12 +107,15 @@ int slave_end(Slave *s) {
 
 int slave_start(Slave *s) {
     if (slave_unstarted(s)) return FAILED;
+    fenv_t host = computing();
     s->running = s->model->start(s);
-    if (!s->running) return FAILED;
-    s->phase = STEPPING;
-    s->model->publish(s);
-    s->refused = 0;
-    return DONE;
+    if (s->running) {
+        s->phase = STEPPING;
+        s->model->publish(s);
+        s->refused = 0;
+    }
+    fesetenv(&host);
+    return s->running ? DONE : FAILED;
 }
 
 int slave_step(Slave *s, double step) {
@@ -105,10 +123,14 @@ int slave_step(Slave *s, double step) {
         return slave_refuse(s, "the FMU is not initialised; call exitInitializationMode first");
     if (s->phase == TERMINATED)
         return slave_refuse(s, "the FMU is terminated; reset it and initialise it again");
-    if (s->model->step(s, step)) return FAILED;
-    s->model->publish(s);
-    s->refused = 0;
-    return DONE;
+    fenv_t host = computing();
+    int status = s->model->step(s, step);
+    if (status == DONE) {
+        s->model->publish(s);
+        s->refused = 0;
+    }
+    fesetenv(&host);
+    return status;
 }
 
 void slave_free(Slave *s) {
@@ -147,8 +169,8 @@ static int placed(Slave *s) {
     return s->own.variables == s->count && s->real && s->whole;
 }
 
-Slave *slave_make(const Dialect *dialect, const void *host, const char *name, const char *guid,
-                  const char *place, const char *wrong_type) {
+static Slave *made(const Dialect *dialect, const void *host, const char *name, const char *guid,
+                   const char *place, const char *wrong_type) {
     Slave *s = calloc(1, sizeof *s);
     size_t n = place ? strlen(place) : 0;
     if (!s) return NULL;
@@ -190,6 +212,14 @@ Slave *slave_make(const Dialect *dialect, const void *host, const char *name, co
     return s;
 }
 
+Slave *slave_make(const Dialect *dialect, const void *host, const char *name, const char *guid,
+                  const char *place, const char *wrong_type) {
+    fenv_t set = computing();
+    Slave *s = made(dialect, host, name, guid, place, wrong_type);
+    fesetenv(&set);
+    return s;
+}
+
 const char *slave_text(const Slave *s, unsigned r) {
     return r < PARAMETERS ? s->text[r] : r == s->count - 1 ? s->status : s->rolling;
 }
@@ -205,7 +235,8 @@ int slave_set_text(Slave *s, unsigned r, const char *text) {
 /* How many bytes variables and parameters need in a state. */
 static size_t own_size(const Slave *s) {
     return s->count * (sizeof *s->real + sizeof *s->whole) + sizeof s->text + sizeof s->rolling +
-           sizeof s->status + sizeof s->cause + 4 * sizeof(int);
+           sizeof s->status + sizeof s->cause + sizeof s->time + sizeof s->numbers +
+           4 * sizeof(int);
 }
 
 /* Copy variables and parameters into a state, or back out of it. */
@@ -219,6 +250,8 @@ static void exchange(Slave *s, unsigned char *bytes, int *running, int back) {
                 {s->rolling, sizeof s->rolling},
                 {s->status, sizeof s->status},
                 {s->cause, sizeof s->cause},
+                {&s->time, sizeof s->time},
+                {&s->numbers, sizeof s->numbers},
                 {&s->phase, sizeof s->phase},
                 {&s->refused, sizeof s->refused},
                 {&s->announced, sizeof s->announced},
@@ -253,13 +286,10 @@ SlaveState *slave_save(Slave *s) {
 static const char NO_STATE[] =
     "FormatError: the bytes are not a saved state of this FMU; save the state again";
 
-int slave_restore(Slave *s, const SlaveState *kept) {
-    uint64_t sealed;
+/* Take up a state whose bytes are sound; returns a status. */
+static int taken_up(Slave *s, const SlaveState *kept) {
+    size_t n = kept->n - sizeof(uint64_t);
     int running = 0;
-    if (kept->n < own_size(s) + sizeof sealed) return slave_failed(s, NO_STATE);
-    size_t n = kept->n - sizeof sealed;
-    memcpy(&sealed, kept->bytes + n, sizeof sealed);
-    if (sealed != seal(s, kept->bytes, n)) return slave_failed(s, NO_STATE);
     exchange(s, (unsigned char *)kept->bytes, &running, 1);
     for (int i = 0; i < PARAMETERS; i++) s->text[i][TEXT - 1] = 0;
     s->rolling[sizeof s->rolling - 1] = s->status[LINE - 1] = s->cause[LINE - 1] = 0;
@@ -269,11 +299,29 @@ int slave_restore(Slave *s, const SlaveState *kept) {
         return DONE;
     }
     int phase = s->phase;
+    uint64_t numbers = s->numbers;
     s->phase = INSTANTIATED;
     if (!s->model->start(s)) return FAILED;
-    if (!s->model->restore(s, kept->bytes + own_size(s), n - own_size(s)))
+    if (s->numbers != numbers ||
+        !s->model->restore(s, kept->bytes + own_size(s), n - own_size(s)))
         return slave_failed(s, NO_STATE);
     s->running = 1;
     s->phase = phase == TERMINATED ? TERMINATED : STEPPING;
     return DONE;
+}
+
+int slave_restore(Slave *s, const SlaveState *kept) {
+    uint64_t sealed;
+    if (kept->n < own_size(s) + sizeof sealed) return slave_failed(s, NO_STATE);
+    size_t n = kept->n - sizeof sealed;
+    memcpy(&sealed, kept->bytes + n, sizeof sealed);
+    if (sealed != seal(s, kept->bytes, n)) return slave_failed(s, NO_STATE);
+    SlaveState *before = slave_save(s);
+    if (!before) return FAILED;
+    fenv_t host = computing();
+    int status = taken_up(s, kept);
+    if (status != DONE) taken_up(s, before);
+    fesetenv(&host);
+    free(before);
+    return status;
 }

@@ -64,7 +64,10 @@ struct Slave {
     size_t frame, conditions, outputs, reals, count; /* places; how many variables */
     double *real;
     int *whole; /* Integers and Booleans */
+    double time;              /* of the last step's end, as the importer of FMI 3 counts it */
+    uint64_t numbers;         /* hash of the calibration that was given; 0: the embedded one */
     char text[PARAMETERS][TEXT];
+    char loaded[TEXT]; /* the file that `other` was read from */
     char rolling[16], status[LINE], cause[LINE];
     uint64_t told[CAUSES];
     unsigned times[CAUSES], causes, remarked; /* remarked: a bit for each kind that was told */

@@ -111,6 +111,26 @@ static int undamaged(const Resources *file) {
     return !strcmp(file->guid, sum) || !strcmp(file->guid, "-");
 }
 
+/* Read another calibration, unless it is the one that was read last: a state may be taken up again
+ * where its file is gone. Returns what is wrong with it, NULL if nothing is. */
+static const char *loaded(Slave *s, const char *path, Calibration *known) {
+    Resources found;
+    int again = !strcmp(path, s->loaded);
+    const char *wrong = again ? NULL : resources_read(&found, path);
+    const Resources *file = again ? &s->other : &found;
+    if (!wrong &&
+        (calibration_read(known, file->table, file->numbers) || (!again && !undamaged(file))))
+        wrong = "is damaged";
+    if (again || wrong) {
+        if (!again) resources_free(&found);
+        return wrong;
+    }
+    resources_free(&s->other);
+    s->other = found;
+    strcpy(s->loaded, path);
+    return NULL;
+}
+
 /* Take up another calibration; tells what is wrong with it. Reference: load_wheel */
 static int override(Slave *s) {
     const char *path = s->text[P_CALIBRATION];
@@ -118,11 +138,7 @@ static int override(Slave *s) {
     double lateral[GAGES];
     char here[GAGES * 16], there[GAGES * 16];
     int gages = s->calibration->gages, same;
-    resources_free(&s->other);
-    const char *wrong = known ? resources_read(&s->other, path) : "needs more memory";
-    if (!wrong && (calibration_read(known, s->other.table, s->other.numbers) ||
-                   !undamaged(&s->other)))
-        wrong = "is damaged";
+    const char *wrong = known ? loaded(s, path, known) : "needs more memory";
     if (wrong) {
         free(known);
         slave_failed(s, "FormatError: %s: %s; give a file made by `tirelib fmu table`", path,
@@ -134,6 +150,7 @@ static int override(Slave *s) {
     for (int g = 0; g < gages && same; g++) same = fabs(known->lateral[g] - lateral[g]) <= 1e-4;
     memcpy(s->calibration, known, sizeof *known);
     free(known);
+    s->numbers = state_hash(s->other.table, s->other.numbers * sizeof *s->other.table);
     if (!same)
         slave_failed(
             s,
@@ -158,6 +175,7 @@ static int start(Slave *s) {
                             s->real[P_MISSING]),
                0;
     calibration_read(s->calibration, s->own.table, s->own.numbers);
+    s->numbers = 0;
     if (path[0] && !override(s)) return 0;
     known = path[0] ? s->other.tire : s->own.tire;
     if (strcmp(tire[0] ? tire : s->own.tire, known))
@@ -233,6 +251,8 @@ static int step(Slave *s, double step) {
                  "ParameterError: the low-pass would reach beyond the samples of the turn");
         slave_complain(s, s->cause);
     }
+    Remark strange = strain_remark(s->real + s->frame, s->gages);
+    if (valid && strange.holds) slave_remark(s, IMPLAUSIBLE_REMARK, &strange);
     return DONE;
 }
 

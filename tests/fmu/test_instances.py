@@ -5,6 +5,7 @@ import multiprocessing
 import shutil
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -90,6 +91,36 @@ def test_a_damaged_state_is_refused_in_the_same_words_and_nothing_changes(
         "FormatError: the bytes are not a saved state of this FMU; save the state again"
     )
     assert same([fmu.read()], [now])
+
+
+def test_a_state_needs_no_file_but_the_calibration_that_it_was_saved_with(
+    ten: LoadedFmu, tmp_path: Path
+) -> None:
+    """A roll-back reads nothing; after a reset the file is read, and must hold the same."""
+    known, samples = live.calibration(), strain()
+    wider = replace(known.chains[-1].laws, contact_width=0.2)
+    path = tmp_path / "a calibration"
+    ten.start(live.RATE, calibration=live.write_other(known, path, ten))
+    play(ten, samples[:, :1130])
+    state, count = ten.slave.getFMUState(), ten.count
+    wanted = play(ten, samples[:, 1130:])
+    path.unlink()
+    ten.slave.setFMUState(state)
+    ten.count = count
+    assert same(play(ten, samples[:, 1130:]), wanted)
+    chains = {**known.chains, -1: replace(known.chains[-1], laws=wider)}
+    other = replace(known, chains=chains)
+    ten.start(live.RATE, calibration=live.write_other(other, path, ten))
+    before = play(ten, samples)[-1]
+    with pytest.raises(FMICallException, match="fmi2SetFMUstate failed with status 3"):
+        ten.slave.setFMUState(state)
+    assert "not a saved state of this FMU" in ten.messages[-1]
+    assert same([ten.read()], [before])
+    live.write_other(known, path, ten)
+    ten.start(live.RATE, calibration=str(path))
+    ten.slave.setFMUState(state)
+    ten.count = count
+    assert same(play(ten, samples[:, 1130:]), wanted)
 
 
 def python_file(samples: int) -> Path:

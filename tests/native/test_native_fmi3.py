@@ -305,13 +305,14 @@ def test_fmpy_handles_the_events(tmp_path: Path) -> None:
 def test_states_go_back_and_forth(fmus: dict[int, Path]) -> None:
     host = Host3(fmus[3]).start()
     shown, states = [], []
-    for frame in frames():
+    for number, frame in enumerate(frames()):
         states.append(host.slave.serializeFMUState(host.slave.getFMUState()))
-        host.step(*frame)
+        host.step(*frame, now=number * STEP)
         shown.append(repr(host.show()))
     late = Host3(fmus[3])
     for at in (70, 5):
         late.slave.setFMUState(late.slave.deserializeFMUState(states[at]))
+        assert late.get("time") == [(at - 1) * STEP + STEP]
         for number, frame in enumerate(frames()[at : at + 40], start=at):
             late.step(*frame)
             assert repr(late.show()) == shown[number]

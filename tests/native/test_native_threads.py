@@ -27,7 +27,7 @@ def compiled(out: Path, *flags: str) -> Path:
     common = ["gcc", *native_fmu.C99, *native_fmu.STRICT, *flags]
     library = [*sources, "-shared", "-fPIC", "-lm", "-o", out.with_suffix(".so")]
     subprocess.run([*common, *library], check=True)
-    host = ["gcc", "-std=c99", *flags, HOST, "-ldl", "-pthread", "-o", out]
+    host = ["gcc", "-std=c99", *flags, HOST, "-ldl", "-lm", "-pthread", "-o", out]
     subprocess.run(host, check=True)
     return out
 
@@ -71,6 +71,16 @@ def test_threads_get_what_one_alone_gets(folder: Path, fmu: Path) -> None:
     np.testing.assert_array_equal(first, second)
     assert np.isfinite(first[-1]).any()
     for one in run(folder / "plain", library, fmu, THREADS):
+        np.testing.assert_array_equal(one, alone)
+
+
+def test_an_importer_may_trap_exceptions_round_upwards_and_have_small_stacks(
+    folder: Path, fmu: Path
+) -> None:
+    compiled(folder / "odd", "-O1", "-DODD")
+    library = fmu / "binaries" / "linux64" / "StrainTire.so"
+    (alone,) = run(folder / "plain", library, fmu, 1)
+    for one in run(folder / "odd", library, fmu, THREADS):
         np.testing.assert_array_equal(one, alone)
 
 

@@ -24,6 +24,7 @@ CASES = {
     "load": (9e3, 0.0, {}),
     "side force": (4e3, 0.6, {}),
     "strain in another unit": (4e3, 0.0, {}),
+    "strain in microstrain": (4e3, 0.0, {}),
     "a gage out": (9e3, 0.1, {}),
     "nothing": (4e3, 0.1, {}),
 }
@@ -38,6 +39,7 @@ WANTED = {
     "turn rate": [r"omega_mismatch: omega \[rad/s\] = 600; by the contacts it is 39.* .. 88.*"],
     "load": [r"Fz_out_of_range: Fz \[N\] = 901\S+; calibrated are 297\S+ .. 502\S+; .*"],
     "side force": [r"Fy_out_of_range: Fy \[N\] = -?7\S+; calibrated are -3\S+ .. 3\S+; .*"],
+    "strain in microstrain": [r"strain_implausible: strain \[1\] = -?\d+\S*; allowed are -1 .*"],
     "strain in another unit": [r"strain_out_of_range: tension = \S+; calibrated .*"],
     "a gage out": [r"Fz_out_of_range: .*"],
     "nothing": [],
@@ -63,6 +65,8 @@ def said(fmu: LoadedFmu, case: str, axes: str) -> list[str]:
         samples[1, 900:] = np.nan
     if case == "strain in another unit":
         samples *= 3.0
+    if case == "strain in microstrain":
+        samples *= 1e6
     fmu.start(live.RATE, axes=axes)
     assert sum(v["turn"] > 1 for v in play(fmu, samples, held(**known))) > 1
     return list(fmu.messages)

@@ -1,13 +1,16 @@
 /* Step one instance in each of several threads; each thread makes its own, writes its outputs to a
- * file of its own, and leaves. The library is loaded once.
+ * file of its own, and leaves. The library is loaded once. With -DODD, threads have small stacks, and
+ * every other one computes as some importers do: exceptions trap, and it rounds upwards.
  * Arguments: library, GUID, resources, frames, doubles of a frame, step [s], results, threads. */
-#define _POSIX_C_SOURCE 200112L
+#define _GNU_SOURCE
 #include <dlfcn.h>
+#include <fenv.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { MOST = 16, OUTPUTS = 8 };
+enum { MOST = 16, OUTPUTS = 8, STACK = 80 << 10 };
+enum { TRAPS = FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW };
 
 typedef struct {
     void *log, *take, *give, *done, *environment;
@@ -35,6 +38,9 @@ static void *drive(void *argument) {
     snprintf(path, sizeof path, "%s%d", given[7], (int)number);
     FILE *results = fopen(path, "wb");
     pthread_barrier_wait(&together);
+#ifdef ODD
+    if (number % 2 && (feenableexcept(TRAPS) || fesetround(FE_UPWARD))) return "no traps";
+#endif
     void *wheel = make("w", 1, given[2], given[3], &none, 0, 0);
     if (!at || !results || !wheel) return "no instance";
     for (size_t i = 0; i < width; i++) at[i] = (unsigned)(6 + i);
@@ -52,6 +58,9 @@ static void *drive(void *argument) {
         if (forget(wheel, &kept) || reset(wheel)) return "no reset";
     }
     leave(wheel);
+#ifdef ODD
+    if (number % 2 && (fegetexcept() != TRAPS || fegetround() != FE_UPWARD)) return "no traps left";
+#endif
     free(at);
     return fclose(results) ? "not written" : NULL;
 }
@@ -79,8 +88,13 @@ int main(int n, char **arguments) {
     frames = fread(data, sizeof *data, sizeof data / sizeof *data, file) / width;
     fclose(file);
     pthread_barrier_init(&together, NULL, (unsigned)threads);
+    pthread_attr_t small;
+    pthread_attr_init(&small);
+#ifdef ODD
+    if (pthread_attr_setstacksize(&small, STACK)) return 3;
+#endif
     for (size_t i = 0; i < (size_t)threads; i++)
-        if (pthread_create(thread + i, NULL, drive, (void *)i)) return 3;
+        if (pthread_create(thread + i, &small, drive, (void *)i)) return 3;
     for (int i = 0; i < threads; i++) {
         pthread_join(thread[i], &said);
         if (said) fprintf(stderr, "%s\n", (const char *)said), failed = 4;

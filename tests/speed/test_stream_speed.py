@@ -1,4 +1,4 @@
-"""Time of a push: `make bench`. The goals are in docs/howto/fmu.md; nothing here fails on time.
+"""Time of a push: `make bench`. Goals are in docs/reference/fmu_python.md; nothing fails on time.
 
 The first two are pushed as they come in a real stream, ten samples at a time, so that a frame finds
 the processor's caches as the frame before left them.

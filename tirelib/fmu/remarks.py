@@ -42,9 +42,15 @@ TEXTS: Mapping[str, str] = {
     "side force; not valid there: calibrate there",
     "other_tire": "the gages do not show what they show of the calibrated tire; nothing is valid: "
     "check tire, order and wiring of the gages",
+    "strain_implausible": "strain [1] = {value}; allowed are {low} .. {high}; nothing is valid "
+    "beyond: give it as a ratio, 1e-6 for a microstrain",
 }
 """By kind, in the order of ``remarks.h``. SI, as the inputs and outputs are; short enough for a
 line of the bench's page."""
+
+
+MOST_STRAIN = 1.0
+"""No gage shows more: the limit of the inputs in the model description."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +71,14 @@ class Remark:
 def lines() -> list[str]:
     """Return the texts for the compiled FMU, in the order of `TEXTS`."""
     return [f"{kind}: {text}" for kind, text in TEXTS.items()]
+
+
+def strain_remark(sample: Sequence[float]) -> dict[str, Remark]:
+    """Return what cannot be strain in a sample of all gages."""
+    for value in sample:
+        if MOST_STRAIN < abs(value) < math.inf:
+            return {"strain_implausible": Remark(value, -MOST_STRAIN, MOST_STRAIN)}
+    return {}
 
 
 def remarks(

@@ -1,7 +1,9 @@
 """One wheel inside an FMU: parameters and frames in, the values of the output variables out."""
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +40,8 @@ class Wheel:
     axes : str
         ``iso``, ``sae`` or ``adapted_sae``: signs of the outputs, and the side on which the
         lateral positions of the gages count as positive.
+    digest : str
+        Hash of the calibration's file; empty for the embedded one.
 
     Raises
     ------
@@ -46,8 +50,14 @@ class Wheel:
     """
 
     def __init__(
-        self, calibration: Calibration, rate: float, samples: int, axes: str = "iso"
+        self,
+        calibration: Calibration,
+        rate: float,
+        samples: int,
+        axes: str = "iso",
+        digest: str = "",
     ) -> None:
+        self._digest = digest
         self._sign = [sign(_AXIS_NAME[quantity], axes) for quantity in QUANTITIES]
         self._order = _gage_order(calibration.lateral, sign("lateral", axes), axes)
         self._mirrored = self._order != sorted(self._order)
@@ -235,6 +245,7 @@ class Wheel:
     def state(self) -> dict[str, Any]:
         """Return everything that is remembered, as JSON knows it."""
         return {
+            "calibration": self._digest,
             "estimator": self._estimator.state(),
             "seen": None,
             "offset": self._offset,
@@ -245,7 +256,15 @@ class Wheel:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Take up a state of a wheel with the same parameters."""
+        """Take up a state of a wheel with the same parameters.
+
+        Raises
+        ------
+        ValueError
+            If the file of the calibration holds another one now.
+        """
+        if state["calibration"] != self._digest:
+            raise ValueError("a state of another calibration")
         self._estimator.restore(state["estimator"])
         self._offset, self._turns = state["offset"], state["turns"]
         self._fault, self._cause, self._seen = state["fault"], state["cause"], None
@@ -277,6 +296,11 @@ def embedded_calibration(path: Path) -> Calibration:
     return read_calibration(path)
 
 
+def read_other(path: str) -> tuple[Calibration, str]:
+    """Return a calibration, and the hash of its file."""
+    return read_calibration(path), sha256(Path(path).read_bytes()).hexdigest()
+
+
 def load_wheel(
     embedded: Path,
     override: str,
@@ -286,6 +310,7 @@ def load_wheel(
     *,
     tire: str = "",
     order: float = 0.0,
+    read: Callable[[str], tuple[Calibration, str]] = read_other,
 ) -> Wheel:
     """Return a wheel with the embedded calibration, or with another of the same gage layout.
 
@@ -298,6 +323,9 @@ def load_wheel(
         Name of the tire, which the calibration must be of; empty: the embedded calibration's.
     order : float, [cycles per turn]
         Cut-off of the low-pass that the calibration must have been made with; 0: any.
+    read : callable
+        Reads the other calibration; one that remembers it lets a state be taken up again where the
+        file is gone.
 
     Raises
     ------
@@ -309,7 +337,7 @@ def load_wheel(
         If a parameter is out of range.
     """
     own = embedded_calibration(embedded)
-    calibration = read_calibration(override) if override else own
+    calibration, digest = read(override) if override else (own, "")
     where = f"StrainTire.fmu: {override or 'the embedded calibration'}"
     calibration.check_layout(tire or own.tire, own.lateral, where)
     if not (order == 0.0 or math.isclose(order, calibration.order, rel_tol=1e-6)):
@@ -318,7 +346,7 @@ def load_wheel(
             "per turn, another low-pass would bias it; set 0, or calibrate anew with "
             "`tirelib calibrate --order`"
         )
-    return Wheel(calibration, rate, samples, axes)
+    return Wheel(calibration, rate, samples, axes, digest)
 
 
 def _gage_order(lateral: tuple[float, ...], side: float, axes: str) -> list[int]:
