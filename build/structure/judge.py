@@ -129,7 +129,7 @@ def _told(h: Hypothesis) -> dict[str, Any]:
         "limit": round(h.limit(0.05), 2),
         "against": h.against,
         "p": round(h.p, 4),
-        "law": h.law,
+        "laws": h.laws,
         "looseness": h.looseness,
         "p_rival": round(h.p_rival, 4),
         "plausible": h.plausible,

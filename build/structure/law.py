@@ -89,7 +89,7 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
                     view,
                     family,
                     family.spread(fit.sizes),
-                    {BASE: fit.widths**2, **law_errors(fit, law, view)},
+                    {BASE: fit.widths**2, **law_errors(fit, (law,), view)},
                     fit.sides,
                 ).likelihood
                 for family in others

@@ -22,7 +22,8 @@ from tirelib.inference.statistics.posterior import Posterior
 from tirelib.inference.statistics.problem import Problem
 
 LAWS = (0.03, 0.1, 0.3)
-"""Relative standard deviations by which laws are off: a hypothesis stays if it does with any."""
+"""Relative standard deviations by which laws are off, each law by its own: a hypothesis stays if it
+does with the likeliest ones, or with the same for all."""
 USUAL = 0.15
 """That of most laws."""
 LOOSEST = 1.0
@@ -42,8 +43,8 @@ class Hypothesis:
         Of every family.
     plain : tuple of shape (n_tires,)
         Statistic of each plain tire by the families other than its own, by family.
-    law : float
-        Relative standard deviation by which its laws are off.
+    laws : tuple of float
+        Relative standard deviation by which each law is off.
     looseness : float
         By how much more laws have to be off for the hypothesis to stay: 1, or infinity if it is
         rejected even with `LOOSEST`.
@@ -61,7 +62,7 @@ class Hypothesis:
     fit: Posterior
     nulls: tuple[Null, ...]
     plain: tuple[FloatArray, ...]
-    law: float
+    laws: tuple[float, ...]
     looseness: float
     plausible: bool
     likelihood: float
@@ -136,55 +137,61 @@ def judged(
         How many of the fit's effects the model had already: they are part of it.
     """
     views = [fit.view(problem, own) for own in OWN]
-    rough = not all(effect.exact for effect in fit.effects)
-    usual, loose = (LAWS, (LOOSEST,)) if rough else ((USUAL,), ())
-    levels = {law: _likelihoods(views, fit, families, law) for law in usual}
-    likelihood = max(max(each) for each in levels.values())
-    laws = sorted(usual, key=lambda law: -max(levels[law]))
+    alike = [_each(fit, law) for law in (LAWS if _vague(fit) else (USUAL,))]
+    found = {laws: _likeliest(views, fit, families, laws) for laws in alike}
+    laws = max(alike, key=lambda laws: found[laws][0])
+    for k in _vague(fit) if len(fit.effects) > 1 else ():
+        more = [(*laws[:k], law, *laws[k + 1 :]) for law in LAWS]
+        near = found[laws][1:]
+        found |= {m: _likeliest(near, fit, families, m) for m in more if m not in found}
+        laws = max(found, key=lambda laws: found[laws][0])
+    tried = dict.fromkeys([laws, *sorted(alike, key=lambda laws: -found[laws][0])])
+    loosest = _each(fit, LOOSEST)
     looseness = np.inf
-    for law in (*laws, *loose):
-        best = int(np.argmax(levels[min(law, LAWS[-1])]))
-        tested = _tested(fit, views, families, law, best)
-        nulls, plain = tested
+    for each in (*tried, *([loosest] if _vague(fit) else [])):
+        nulls, plain = _tested(fit, found[each if each in found else alike[-1]][1], families, each)
         stays = _p(np.array([_excusing(nulls).scores.max()]), plain)[0] > alpha
-        if law == laws[0] or (stays and law != LOOSEST):
-            kept = *tested, law
+        if each == laws or (stays and each != loosest):
+            kept = nulls, plain, each
         if stays:
-            looseness = max(law / LAWS[-1], 1.0)
+            looseness = max(*each, LAWS[-1]) / LAWS[-1] if each else 1.0
             break
-    return Hypothesis(fit, *kept, looseness, plausible(fit, own_effects), likelihood)
+    return Hypothesis(fit, *kept, looseness, plausible(fit, own_effects), found[laws][0])
 
 
-def _null(view: View, fit: Posterior, family: Family, law: float) -> Null:
+def _vague(fit: Posterior) -> list[int]:
+    """Return the places of effects whose laws are only roughly right."""
+    return [k for k, effect in enumerate(fit.effects) if not effect.exact]
+
+
+def _each(fit: Posterior, law: float) -> tuple[float, ...]:
+    """Return one relative standard deviation for all laws that are only roughly right."""
+    return tuple(0.0 if effect.exact else law for effect in fit.effects)
+
+
+def _null(view: View, fit: Posterior, family: Family, laws: Sequence[float]) -> Null:
     wide = fit.widths**2
     wide[len(fit.point.base) :] *= PRIOR**2
-    allowed = {BASE: wide, **law_errors(fit, law, view)}
+    allowed = {BASE: wide, **law_errors(fit, laws, view)}
     return Null(view, family, family.spread(fit.sizes), allowed, fit.sides)
 
 
-def _likelihoods(
-    views: Sequence[View], fit: Posterior, families: Sequence[Family], law: float
-) -> list[float]:
-    """Return the largest likelihood over the families for each size of a run's own misfit."""
-    return [max(_null(view, fit, family, law).likelihood for family in families) for view in views]
+def _likeliest(
+    views: Sequence[View], fit: Posterior, families: Sequence[Family], laws: Sequence[float]
+) -> tuple[float, View]:
+    """Return the largest likelihood over families and sizes of a run's own misfit, and its view."""
+    each = [max(_null(view, fit, f, laws).likelihood for f in families) for view in views]
+    return max(each), views[int(np.argmax(each))]
 
 
 def _tested(
-    fit: Posterior,
-    views: Sequence[View],
-    families: Sequence[Family],
-    law: float,
-    best: int,
+    fit: Posterior, at: View, families: Sequence[Family], laws: Sequence[float]
 ) -> tuple[tuple[Null, ...], tuple[FloatArray, ...]]:
-    """Return the tests by every family, and the statistics of plain tires by the others.
-
-    `best` is the likeliest size of a run's own misfit.
-    """
-    at = views[best]
-    nulls = tuple(_null(at, fit, family, law) for family in families)
+    """Return the tests by every family, and the statistics of plain tires by the others."""
+    nulls = tuple(_null(at, fit, family, laws) for family in families)
     plain = []
     for family in families:
-        planted, noise = _drawn(fit, family, law_errors(fit, law, at), at.white.shape[1])
+        planted, noise = _drawn(fit, family, law_errors(fit, laws, at), at.white.shape[1])
         turned = _products(at, noise + planted @ at.white)  # whitened
         plain.append([null.scores_of(turned) for null in nulls if null.family is not family])
     every = np.concatenate([scores for each in plain for scores in each], axis=1)
@@ -262,38 +269,43 @@ def _products(view: View, white: FloatArray) -> Products:
     return view.white @ white.T, np.sum(white**2, axis=1)
 
 
-def law_errors(fit: Posterior, law: float, view: View) -> dict[str, float | FloatArray]:
-    """Return variances by block where laws are off by a relative standard deviation.
+def law_errors(fit: Posterior, laws: Sequence[float], view: View) -> dict[str, float | FloatArray]:
+    """Return variances by block where each law is off by a relative standard deviation.
 
     They come on top of what plain tires show. A law's error has shapes of its own, and looks to
     some extent like each other effect: by the problem's share of its size (`Model.lookalike`) in
     what the base cannot take.
     """
     out: dict[str, float | FloatArray] = {
-        ROUGHLY + effect.name: law**2 for effect in fit.effects if not effect.exact
+        ROUGHLY + effect.name: law**2
+        for effect, law in zip(fit.effects, laws, strict=True)
+        if not effect.exact
     }
     if out and fit.lookalike:
-        square, others = _beyond_base(fit, view)
-        out |= {name: (fit.lookalike * law) ** 2 * square / each for name, each in others.items()}
+        each, others = _beyond_base(fit, view)
+        square = fit.lookalike**2 * float(each @ np.square(laws))
+        out |= {name: square / other for name, other in others.items()}
     return out
 
 
-def _beyond_base(fit: Posterior, view: View) -> tuple[float, dict[str, float]]:
-    """Return the square of what the laws do that the base cannot take, and of other effects' rows.
+def _beyond_base(fit: Posterior, view: View) -> tuple[FloatArray, dict[str, float]]:
+    """Return the square of what each law does that the base cannot take, and of others' rows.
 
     The rows are of a strength of one range; an effect of which the base takes all is left out.
     """
     gram, first = view.normal.gram, len(fit.point.base)
     base = gram[:first, :first] + np.diag(fit.widths[:first] ** -2)
     left = gram - gram[:, :first] @ np.linalg.solve(base, gram[:first])
-    each = zip(fit.effects, fit.point.ranges, strict=False)
-    ranges = np.concatenate([np.where(effect.exact, 0.0, size) for effect, size in each])
-    here = slice(first, first + len(ranges))
+    done = []
+    for size in fit.point.ranges[: fit.count]:
+        own = slice(first, first + len(size))
+        done.append(float(size @ left[own, own] @ size))
+        first = own.stop
     others = {
         effect.name: float(np.mean(np.diag(left)[view.normal.blocks[effect.name]]))
         for effect in fit.point.effects[fit.count :]
     }
-    return float(ranges @ left[here, here] @ ranges), {k: v for k, v in others.items() if v > 0.0}
+    return np.array(done), {k: v for k, v in others.items() if v > 0.0}
 
 
 def plausible(fit: Posterior, own_effects: int) -> bool:

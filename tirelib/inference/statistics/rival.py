@@ -23,20 +23,22 @@ def p_against(problem: Problem, hypothesis: Hypothesis, rival: Hypothesis) -> fl
 
     The inverse of the ratio, or, if that is larger, the share of a family's tires, with the
     hypothesis planted, in which the rival gains as much or more; the largest over the families.
+    What is measured and the tires are weighed by the same laws and the same families.
     """
     ratio = max(rival.likelihood - hypothesis.likelihood, 0.0)
     fit = hypothesis.fit
     modelled = fit.rest - np.tensordot(_coordinates(fit), fit.rows[BASE], axes=1)
     view = hypothesis.null.view
-    laws, own = law_errors(fit, hypothesis.law, view), view.own
+    laws, own = law_errors(fit, hypothesis.laws, view), view.own
     p = [float(np.exp(-ratio))]
     for family in (null.family for null in hypothesis.nulls):
-        # what is measured where the hypothesis is true, less what is measured
+        # what is measured where the hypothesis is true, less what is measured; first nothing
         moved = plain_tires(problem, fit, family, laws, own) - modelled
-        gains = _likelihood(problem, rival, family, moved) - _likelihood(
+        moved = np.concatenate([np.zeros((1, *fit.rest.shape)), moved])
+        measured, *gains = _likelihood(problem, rival, family, moved) - _likelihood(
             problem, hypothesis, family, moved
         )
-        p.append((1 + int(np.sum(gains >= ratio))) / (len(gains) + 1))
+        p.append((1 + int(np.sum(np.array(gains) >= measured))) / (len(gains) + 1))
     return max(p)
 
 
