@@ -71,7 +71,7 @@ class Toy:
         self.ends = np.full(3, -np.inf), np.full(3, np.inf)
         self.dead: Mapping[str, str] = {}
         self.living = tuple(EFFECTS.values())
-        self.lookalike = 0.25
+        self.lookalike = 0.075
 
     def whitener(self, own: float) -> "Louder":
         return Louder(own)

@@ -32,9 +32,9 @@ it goes otherwise with conditions, has another shape, one that goes with speed, 
 or sharper. Root mean squares over twelve campaigns of the rig with a hidden effect are .35, .2, .07
 and .03, over four of the continuum .18, .25, .09 and .03."""
 
-LOOKALIKE_SHARE = 0.25
-"""How much of a law's error looks like any one other effect beyond these parts, as a share of the
-whole. Half and double of it: docs/theory/verdict_numbers.md."""
+LOOKALIKE_SHARE = 0.075
+"""How much of what a law does may be an error that looks like any one other effect, beyond these
+parts: a relative standard deviation. Half and double of it: docs/theory/verdict_numbers.md."""
 
 
 def law_errors(

@@ -272,9 +272,9 @@ def _products(view: View, white: FloatArray) -> Products:
 def law_errors(fit: Posterior, laws: Sequence[float], view: View) -> dict[str, float | FloatArray]:
     """Return variances by block where each law is off by a relative standard deviation.
 
-    They come on top of what plain tires show. A law's error has shapes of its own, and looks to
-    some extent like each other effect: by the problem's share of its size (`Model.lookalike`) in
-    what the base cannot take.
+    They come on top of what plain tires show. A law's error has shapes of its own. To some extent
+    it looks like each other effect: by the problem's share (`Model.lookalike`) of what the laws do
+    that the base cannot take.
     """
     out: dict[str, float | FloatArray] = {
         ROUGHLY + effect.name: law**2
@@ -282,30 +282,29 @@ def law_errors(fit: Posterior, laws: Sequence[float], view: View) -> dict[str, f
         if not effect.exact
     }
     if out and fit.lookalike:
-        each, others = _beyond_base(fit, view)
-        square = fit.lookalike**2 * float(each @ np.square(laws))
-        out |= {name: square / other for name, other in others.items()}
+        square, others = _beyond_base(fit, view)
+        out |= {name: fit.lookalike**2 * square / other for name, other in others.items()}
     return out
 
 
-def _beyond_base(fit: Posterior, view: View) -> tuple[FloatArray, dict[str, float]]:
-    """Return the square of what each law does that the base cannot take, and of others' rows.
+def _beyond_base(fit: Posterior, view: View) -> tuple[float, dict[str, float]]:
+    """Return the square of what laws do that the base cannot take, and of other effects' rows.
 
     The rows are of a strength of one range; an effect of which the base takes all is left out.
     """
     gram, first = view.normal.gram, len(fit.point.base)
     base = gram[:first, :first] + np.diag(fit.widths[:first] ** -2)
     left = gram - gram[:, :first] @ np.linalg.solve(base, gram[:first])
-    done = []
-    for size in fit.point.ranges[: fit.count]:
+    done = 0.0
+    for effect, size in zip(fit.effects, fit.point.ranges, strict=False):
         own = slice(first, first + len(size))
-        done.append(float(size @ left[own, own] @ size))
+        done += 0.0 if effect.exact else float(size @ left[own, own] @ size)
         first = own.stop
     others = {
         effect.name: float(np.mean(np.diag(left)[view.normal.blocks[effect.name]]))
         for effect in fit.point.effects[fit.count :]
     }
-    return np.array(done), {k: v for k, v in others.items() if v > 0.0}
+    return done, {k: v for k, v in others.items() if v > 0.0}
 
 
 def plausible(fit: Posterior, own_effects: int) -> bool:

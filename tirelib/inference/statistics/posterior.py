@@ -78,7 +78,7 @@ class Posterior:
     far : bool
         Whether the model leaves more than `FAR` of what noise leaves.
     lookalike : float
-        The problem's share of a law's error that looks like any one other effect.
+        How much of what a law does may be an error that looks like any one other effect.
     """
 
     point: Point

@@ -114,9 +114,9 @@ class Model(Protocol):
 
     @property
     def lookalike(self) -> float:
-        """How much of a law's error looks like any one other effect beyond these rows, as a share.
+        """How much of what a law does may be an error that looks like any one other effect.
 
-        Zero where the rows of `roughly` hold all that an error may look like.
+        A relative standard deviation; zero where `roughly` has all that an error may look like.
         """
 
 
