@@ -98,3 +98,15 @@ def test_a_rival_counts_even_where_it_is_itself_rejected(monkeypatch: pytest.Mon
     covered = found.hypotheses.at(["twist"])
     assert covered is not None
     assert covered.rival == "bend"
+
+
+def test_a_rival_out_of_its_range_puts_nothing_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    tested = Hypotheses._tested
+
+    def outside(self: Hypotheses, problem: Any, fit: Posterior) -> Hypothesis:
+        """Return a hypothesis of the exact law as one whose strength its range does not allow."""
+        h = tested(self, problem, fit)
+        return replace(h, plausible=False) if h.names == ("bend",) else h
+
+    monkeypatch.setattr(Hypotheses, "_tested", outside)
+    assert select(planted("bend", 3), FAMILIES).sets == (("twist",),)

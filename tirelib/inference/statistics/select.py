@@ -324,8 +324,9 @@ def select(
         every = sorted(
             (h for h in dict.fromkeys(level) if h is not None), key=lambda h: -h.likelihood
         )
-        # a rival that is rejected or out of its range is not there, but something like it may be
-        fitted = [hypotheses.against(h, every[0]) for h in every if h.plausible]
+        possible = [h for h in every if h.plausible]
+        # a rival that is itself rejected is not there, but something like it may be
+        fitted = [hypotheses.against(h, possible[0]) for h in possible]
         staying = [h for h in fitted if h.p > alpha]
         simpler = {h: hypotheses.simpler(h) for h in staying}
         members = [h for h in staying if simpler[h] is None]
