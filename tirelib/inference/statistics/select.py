@@ -335,7 +335,7 @@ def select(
         if staying:
             likeliest = max(filter(None, simpler.values()), key=lambda h: h.likelihood)
             return done("form_inadequate", [likeliest])
-        leaders = fitted[: LEADERS if size == 1 else 1]
+        leaders = fitted[:LEADERS]
     leader = leaders[0] if leaders else None
     while many and leader is not None and leader.plausible and not np.isfinite(leader.looseness):
         further = _further(leader, hypotheses.effects, 1)
