@@ -24,7 +24,7 @@ from tirelib.measured.features.extract import extract_features
 from tirelib.measured.signal import LowPass, cut_turns
 from tirelib.rig.laws import WaterWedge
 from tirelib.rig.observe import contact, trace
-from tirelib.rig.solve import State, solve
+from tirelib.rig.solve import RigState, solve
 from tirelib.rig.tire import NEW_DEPTH, Condition, RigTire, tire
 
 DENSITY = 1000.0
@@ -86,7 +86,9 @@ def _place(knots: FloatArray, value: float) -> tuple[int, float]:
     return i, float(np.clip((value - knots[i]) / (knots[i + 1] - knots[i]), 0.0, 1.0))
 
 
-def solved(load: float, wedge: float, speed: float = SPEED, start: State | None = None) -> State:
+def solved(
+    load: float, wedge: float, speed: float = SPEED, start: RigState | None = None
+) -> RigState:
     """Return the rig's state that rolls freely on a wedge of a pressure [Pa], from a near one."""
     rolling = tire("reference")
     if wedge:
@@ -95,7 +97,7 @@ def solved(load: float, wedge: float, speed: float = SPEED, start: State | None 
     return solve(rolling, Condition(load, PRESSURE, speed, 0.0, 0.0, None), start)
 
 
-def lift_of(state: State) -> float:
+def lift_of(state: RigState) -> float:
     """Return what the water carries in a state [N]: the load less that of the same tread, dry."""
     wet = contact(state)
     dry = contact(replace(state, tire=replace(state.tire, road_laws=())))
@@ -114,7 +116,7 @@ def water_table(loads: Sequence[float] = LOADS, wedges: Sequence[float] = WEDGES
     return WaterTable(np.array(loads), np.array(wedges), np.array(change))
 
 
-def told_of(state: State, calibration: Calibration) -> Estimates:
+def told_of(state: RigState, calibration: Calibration) -> Estimates:
     """Return what a calibration tells of turns of a state."""
     wave, omega = trace(state, POINTS).strain, SPEED / RigTire().ring_radius
     samples = int(TURNS * 2.0 * np.pi / omega * RATE)

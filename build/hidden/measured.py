@@ -23,7 +23,7 @@ from tirelib.rig.measure import gages
 from tirelib.rig.mesh import mesh
 from tirelib.rig.observe import Trace, edges, trace
 from tirelib.rig.shown import Shown
-from tirelib.rig.solve import State, solve
+from tirelib.rig.solve import RigState, solve
 from tirelib.rig.tire import N_STRIPS, Condition, RigTire
 
 CACHE = Path(__file__).parents[1] / "out" / "hidden"
@@ -42,7 +42,7 @@ class Plain:
     """A day and its solved states without any effect."""
 
     day: Day
-    states: tuple[State, ...]
+    states: tuple[RigState, ...]
 
 
 def plain(seed: int) -> Plain:
@@ -52,7 +52,7 @@ def plain(seed: int) -> Plain:
         stored: Plain = pickle.loads(file.read_bytes())
         return Plain(stored.day, tuple(replace(s, grid=grid) for s in stored.states))
     today = day(seed)
-    states: dict[int, State] = {}
+    states: dict[int, RigState] = {}
     order = sorted(range(len(today.really)), key=lambda k: today.really[k].load)
     for run in order:
         cond = today.really[run]
@@ -72,7 +72,7 @@ def _apart(a: Condition, b: Condition) -> float:
     )
 
 
-def _toward(state: State, cond: Condition) -> State:
+def _toward(state: RigState, cond: Condition) -> RigState:
     """Extrapolate a state to another load."""
     more = cond.load - state.condition.load
     return replace(
@@ -90,7 +90,7 @@ def keep(file: Path, content: bytes) -> None:
     part.rename(file)
 
 
-def solved(base: Plain, planted: Planted, run: int) -> State:
+def solved(base: Plain, planted: Planted, run: int) -> RigState:
     """Return the state of a run with effects."""
     today, start = base.day, base.states[run]
     tire: RigTire = today.tire
@@ -104,7 +104,7 @@ def solved(base: Plain, planted: Planted, run: int) -> State:
 
 def traces(
     base: Plain, planted: Planted, progress: Callable[[str], None] | None = None
-) -> tuple[list[State], list[Trace]]:
+) -> tuple[list[RigState], list[Trace]]:
     """Return states and what perfect gages would show, run by run."""
     states, shown = [], []
     today = base.day
@@ -132,7 +132,9 @@ def traces(
     return states, shown
 
 
-def waveforms(base: Plain, states: Sequence[State], shown: Sequence[Trace], kind: str) -> Waveforms:
+def waveforms(
+    base: Plain, states: Sequence[RigState], shown: Sequence[Trace], kind: str
+) -> Waveforms:
     """Return the mean waveforms of the runs; `kind` takes part in the seed of the noise."""
     today, chain, low_pass = base.day, base.day.chain, LowPass()
     rng = np.random.default_rng([today.seed, crc32(kind.encode()), 13])
@@ -195,7 +197,7 @@ def _filtered(wave: FloatArray, late: float, low_pass: LowPass) -> FloatArray:
 
 
 def _conditions(
-    today: Day, states: Sequence[State], rng: np.random.Generator
+    today: Day, states: Sequence[RigState], rng: np.random.Generator
 ) -> dict[str, FloatArray]:
     chain, n = today.chain, len(states)
 

@@ -12,13 +12,13 @@ from proof.laboratory import CREEP, laboratory, press
 from proof.tires import CACHE, measured
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.parameters import Tire
+from tirelib.effects.state import Operating
 from tirelib.inference.identify.campaign_data import straight_runs
 from tirelib.inference.identify.identify import estimated
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import Waveforms
 from tirelib.model.base import operating_points, values_of
 from tirelib.model.solution import solved
-from tirelib.model.state import Operating
 from tirelib.rig.solve import inflated
 from tirelib.rig.tire import RigTire
 

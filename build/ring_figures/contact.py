@@ -13,7 +13,7 @@ from tirelib.report.figures.ring_panels import (
     RATE,
     SHEAR,
     STRAIN,
-    Quantity,
+    Curve,
     draw,
     half_width,
     inflation_labels,
@@ -141,7 +141,7 @@ def _rate_peaks(axes: Axes, done: Simulation) -> None:
 
 
 def _deflections(
-    axes: Axes, done: Simulation, quantity: Quantity, within: float, *, edges: bool = False
+    axes: Axes, done: Simulation, quantity: Curve, within: float, *, edges: bool = False
 ) -> None:
     names = deflection_labels(done)
     draw(axes, done, quantity, names, sequence(len(names)), within=within, edges=edges)

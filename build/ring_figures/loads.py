@@ -11,7 +11,7 @@ from tirelib.report.figures.ring_panels import (
     RATE,
     SHEAR,
     STRAIN,
-    Quantity,
+    Curve,
     draw,
     half_width,
     inflation_labels,
@@ -75,7 +75,7 @@ def _rolling(done: Simulation, *, inflated: bool = True) -> str:
 def _pair(
     done: Simulation,
     labels: Sequence[str],
-    quantities: tuple[Quantity, Quantity],
+    quantities: tuple[Curve, Curve],
     title: str,
     *,
     wider: float = 1.0,

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
+from tirelib.effects.state import Operating, State
 from tirelib.measured.signal import LowPass
 from tirelib.model.base import predict
 from tirelib.model.chain import Changes
 from tirelib.model.solution import solved
-from tirelib.model.state import Operating, State
 from tirelib.physics.contact.free_boundary import Start
 
 

@@ -17,10 +17,10 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
+from tirelib.effects.state import Operating, State
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import smoothed
-from tirelib.model.state import Operating, State
 from tirelib.physics.contact import radial, shear
 from tirelib.physics.contact.shear_law import Shear
 from tirelib.physics.contact.tread import Tread

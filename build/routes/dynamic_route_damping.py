@@ -28,10 +28,10 @@ from routes.edges import EdgeReading, read_edges
 from routes.static_route_fit import Parameter, Quantity, fit_few
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
+from tirelib.effects.state import Operating
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.measured.signal import LowPass
 from tirelib.model.base import operating_points
-from tirelib.model.state import Operating
 
 TRIALS = (0.0, 0.06, 0.12)
 """Damping ratios (law "sidewall") at which the model is solved; a parabola lies between."""

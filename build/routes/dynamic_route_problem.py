@@ -13,10 +13,10 @@ from routes.static_route_fit import FewFit, Parameter, Quantity, fit_few
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import CalibrationError, ConvergenceError, ParameterError
 from tirelib.core.parameters import TireFile
+from tirelib.effects.state import State
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import operating_points, values_of
-from tirelib.model.state import State
 from tirelib.physics.contact import radial
 from tirelib.physics.ring.compliance import compliance
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
+from tirelib.effects.state import Operating, State
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.measured.waveforms import GRID
-from tirelib.model.state import Operating, State
 from tirelib.physics.contact import radial
 from tirelib.physics.contact.exact import load_exact
 from tirelib.physics.ring.compliance import compliance

@@ -20,11 +20,11 @@ import numpy as np
 from routes.correction import Correction, predict_with
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import CalibrationError, ShapeError
+from tirelib.effects.state import Operating
 from tirelib.measured.features.peaks import peak
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import predict, smoothed
-from tirelib.model.state import Operating
 from tirelib.physics.contact.exact import load_exact
 
 FINER = 4

@@ -24,7 +24,7 @@ from structure.cases import NONE, Case, case_file, load_case
 from structure.make import FAMILIES, OUT, seeds
 from tirelib.core.threads import one_thread
 from tirelib.inference.compare.error import error_of
-from tirelib.inference.compare.model import Model
+from tirelib.inference.compare.model import TireModel
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.inference.identify.discrepancy import Discrepancy
 from tirelib.inference.identify.identify import estimate, prior_std, start_file
@@ -107,7 +107,7 @@ def row(case: Case, without: Sequence[str], prior: Mapping[str, float]) -> Row:
         )
     wrong = _stiffness(fit, runs, case)
     numbers[STIFFNESS] = Found(wrong, abs(wrong) <= NEAR)
-    error = error_of(runs, Model.fitted(fit.values, (), ())).value
+    error = error_of(runs, TireModel.fitted(fit.values, (), ())).value
     return Row(case.seed, error, numbers)
 
 

@@ -14,7 +14,7 @@ from tirelib.rig.laws import SectionInertia
 from tirelib.rig.mesh import mesh
 from tirelib.rig.observe import Trace, edges, trace
 from tirelib.rig.shown import Shown as Seen
-from tirelib.rig.solve import State, solve
+from tirelib.rig.solve import RigState, solve
 from tirelib.rig.tire import Condition, RigTire
 
 MESH = (0.015, 0.15)
@@ -176,7 +176,7 @@ def _apart(a: Condition, b: Condition) -> float:
     )
 
 
-def _toward(state: State, cond: Condition, tire: RigTire) -> State:
+def _toward(state: RigState, cond: Condition, tire: RigTire) -> RigState:
     """Extrapolate a state to another load, on a tire whose tread may be thinner."""
     more = cond.load - state.condition.load
     lower = tire.free_radius - state.tire.free_radius
@@ -187,7 +187,7 @@ def _toward(state: State, cond: Condition, tire: RigTire) -> State:
     )
 
 
-def _frame(state: State, setting: Setting) -> Frame:
+def _frame(state: RigState, setting: Setting) -> Frame:
     seen = trace(state, POINTS)
     lead: Array = edges(state)[0]
     return Frame(

@@ -20,7 +20,7 @@ from scipy.stats import qmc
 from tirelib.core.threads import one_thread
 from tirelib.rig.measure import slip_ratio
 from tirelib.rig.observe import edges, forces, trace
-from tirelib.rig.solve import SolverError, State, solve
+from tirelib.rig.solve import RigState, SolverError, solve
 from tirelib.rig.tire import Condition, tire
 
 OUT = Path(__file__).parents[1] / "out" / "virtual_tire"
@@ -81,7 +81,7 @@ def condition(inputs: np.ndarray) -> Condition:
     return Condition(load, pressure, speed, alpha, camber, slip)
 
 
-def solved(inputs: np.ndarray, start: State | None) -> tuple[State, Point]:
+def solved(inputs: np.ndarray, start: RigState | None) -> tuple[RigState, Point]:
     """Solve a point."""
     rolling = tire("reference")
     if inputs.size > len(INPUTS):
@@ -107,7 +107,7 @@ def solved(inputs: np.ndarray, start: State | None) -> tuple[State, Point]:
 def main(points: int, seconds: float, folder: Path, friction: bool) -> None:
     """Solve what is not there yet, for at most so many seconds of CPU."""
     folder.mkdir(parents=True, exist_ok=True)
-    states: list[tuple[np.ndarray, State]] = []
+    states: list[tuple[np.ndarray, RigState]] = []
     begun = time.process_time()
     low, high = limits(friction)
     for number, inputs in enumerate(design(points, friction)):

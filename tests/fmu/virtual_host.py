@@ -21,7 +21,7 @@ from tirelib.fmu.virtual.spec import build_virtual, default_surface, friction_su
 from tirelib.fmu.virtual.surface import Surface, mirrored, read_surface
 from tirelib.measured.observations import observe
 from tirelib.rig.observe import Forces, forces, trace
-from tirelib.rig.solve import State, solve
+from tirelib.rig.solve import RigState, solve
 from tirelib.rig.tire import Condition, tire
 
 RATE = 1e4
@@ -58,7 +58,9 @@ def file(samples: int, *, python: bool = False) -> Path:
     return build_virtual(live.folder() / name, samples_per_step=samples, python=python)
 
 
-def hold_against_rig(known: Surface, condition: Sequence[float], part: str) -> tuple[State, Forces]:
+def hold_against_rig(
+    known: Surface, condition: Sequence[float], part: str
+) -> tuple[RigState, Forces]:
     """Solve the rig at a condition of a surface, and demand the errors stated for a part of it.
 
     Returns

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE, Effect, effect
+from tirelib.effects.brush_state import BrushConditions, BrushState
 from tirelib.effects.load import all_effects
-from tirelib.model.brush import BrushConditions, BrushState, brush_forces, brush_state
+from tirelib.model.brush import brush_forces, brush_state
 from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
 from tirelib.physics.brush.shaped import predict_shaped
 

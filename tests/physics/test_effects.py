@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from tirelib.core.parameters import read_tire
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.effects.load import all_effects
+from tirelib.effects.state import Operating, State
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import predict, values_of
-from tirelib.model.state import Operating, State
 from tirelib.model.strain_bench import reference_plan
 
 TIRE = read_tire("table-6-1").tire.changed(damping=0.0)

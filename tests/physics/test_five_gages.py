@@ -21,7 +21,7 @@ from tirelib.physics.strain.gages import gage_harmonics, gage_trace
 from tirelib.physics.strain.innerliner import strain_harmonics
 from tirelib.rig.observe import forces
 from tirelib.rig.observe import trace as rig_trace
-from tirelib.rig.solve import State, solve
+from tirelib.rig.solve import RigState, solve
 from tirelib.rig.tire import Condition, RigTire
 
 TIRE = Tire(
@@ -49,7 +49,7 @@ BASE = Condition(4800.0, 2.3e5, 65.0 / 3.6)
 
 
 @cache
-def rig(**change: float) -> State:
+def rig(**change: float) -> RigState:
     cond = replace(BASE, **change)
     return solve(RIG, cond, None if cond == BASE else rig())
 
@@ -257,7 +257,7 @@ def test_bad_input_is_refused() -> None:
         gage_trace(still, -0.003, low_pass=LowPass(cut_off=300.0))
 
 
-def measured(state: State) -> StrainTrace:
+def measured(state: RigState) -> StrainTrace:
     """Strain of the rig on the model's grid, zero opposite the contact."""
     t = rig_trace(state)
     return StrainTrace(

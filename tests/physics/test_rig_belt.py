@@ -20,7 +20,7 @@ from tirelib.rig.belt import (
 )
 from tirelib.rig.mesh import mesh
 from tirelib.rig.observe import forces, trace
-from tirelib.rig.solve import State, solve
+from tirelib.rig.solve import RigState, solve
 from tirelib.rig.tire import Condition, RigTire
 
 TIRE = RigTire()
@@ -98,7 +98,7 @@ def test_inflated_spinning_belt_is_the_analytical_ring(pressure: float, omega: f
 
 
 @cache
-def rolling(speed: float, fine: float = 0.009) -> State:
+def rolling(speed: float, fine: float = 0.009) -> RigState:
     start = None if fine != 0.009 or speed == 18.0 else rolling(18.0)
     # everything scales with `fine`, so that one number describes the mesh
     return solve(TIRE, Condition(4000.0, 2.3e5, speed), start, mesh(fine, 10.0 * fine, 0.42))

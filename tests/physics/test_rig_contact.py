@@ -9,7 +9,7 @@ from scipy.signal import find_peaks
 
 from tirelib.rig.belt import FIELDS, LATERAL, U, V
 from tirelib.rig.observe import contact, edges, forces, trace
-from tirelib.rig.solve import State, solve
+from tirelib.rig.solve import RigState, solve
 from tirelib.rig.system import fields_at_points
 from tirelib.rig.tire import Condition, RigTire
 
@@ -19,13 +19,13 @@ LOADS = (1200.0, 3000.0, 4800.0, 8400.0)
 
 
 @cache
-def state(tire: RigTire = TIRE, **change: float) -> State:
+def state(tire: RigTire = TIRE, **change: float) -> RigState:
     cond = replace(BASE, **change)
     start = None if cond == BASE and tire == TIRE else state()
     return solve(tire, cond, start)
 
 
-def sidewall(s: State) -> dict[str, float]:
+def sidewall(s: RigState) -> dict[str, float]:
     """Force and moment of the sidewalls on the rim, integrated on their own [N], [N m]."""
     tire, cond, phi = s.tire, s.condition, s.grid.phi
     z = fields_at_points(s.grid, s.control)
@@ -151,7 +151,7 @@ def test_contact_shrinks_with_pressure() -> None:
     assert length[0] > length[1] > length[2]
 
 
-def shift(s: State) -> float:
+def shift(s: RigState) -> float:
     """Centre of pressure before the axle [m]."""
     c = contact(s)
     return float(np.sum(c.area * c.q * c.kin.x) / forces(s).fz)

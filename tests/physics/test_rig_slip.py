@@ -8,7 +8,7 @@ import pytest
 
 from tirelib.rig.measure import slip_ratio
 from tirelib.rig.observe import Forces, contact, edges, forces, trace
-from tirelib.rig.solve import State, solve
+from tirelib.rig.solve import RigState, solve
 from tirelib.rig.tire import Condition, RigTire
 
 TIRE = RigTire()
@@ -18,7 +18,7 @@ SLIPS = (0.005, 0.01, 0.03, 0.1, 0.6)
 
 
 @cache
-def state(**change: float) -> State:
+def state(**change: float) -> RigState:
     cond = replace(BASE, **change)
     return solve(TIRE, cond, None if cond == BASE else state())
 
@@ -107,7 +107,7 @@ def test_slip_ratio_is_what_was_set() -> None:
 
 
 def test_braking_deepens_the_second_peak_and_driving_the_first() -> None:
-    def depth(s: State) -> tuple[float, float]:
+    def depth(s: RigState) -> tuple[float, float]:
         tr = trace(s)
         strain = tr.strain[:, 2]
         return float(strain[tr.phi < 0.0].min()), float(strain[tr.phi > 0.0].min())

@@ -16,7 +16,7 @@ from tirelib.physics.contact.tread import Tread
 from tirelib.physics.ring.compliance import compliance
 from tirelib.physics.ring.ring import Ring
 from tirelib.rig.observe import edges, forces
-from tirelib.rig.solve import State, solve
+from tirelib.rig.solve import RigState, solve
 from tirelib.rig.tire import Condition, RigTire
 
 # the rig's own constants where it has them, none fitted
@@ -47,7 +47,7 @@ ANGLES = (0.0, 0.035, 0.14)
 
 
 @cache
-def rig(**change: float) -> State:
+def rig(**change: float) -> RigState:
     cond = replace(BASE, **change)
     return solve(RIG, cond, None if cond == BASE else rig())
 

@@ -18,8 +18,8 @@ from tests.schema_check import SCHEMAS, wrong_documents
 from tirebench.cli import program as bench
 from tirelib.cli import program
 from tirelib.core.flags import TurnFlag
-from tirelib.model.brush import BrushConditions, BrushState
-from tirelib.model.state import Operating, State
+from tirelib.effects.brush_state import BrushConditions, BrushState
+from tirelib.effects.state import Operating, State
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

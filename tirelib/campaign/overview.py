@@ -13,7 +13,7 @@ from tirelib.campaign.plan import SET_POINTS
 from tirelib.core.units import from_si
 
 
-class Quantity(NamedTuple):
+class Column(NamedTuple):
     """A rig quantity, the set point that goes with it, and how it is shown."""
 
     name: str
@@ -33,15 +33,15 @@ class Quantity(NamedTuple):
 
 
 COLUMNS = (
-    Quantity("Fz", "load", "Fz\nN", "N", "force", 0, "Fz_N"),
-    Quantity("pressure", "pressure", "pressure\nbar", "bar", "pressure", 2, "pressure_bar"),
-    Quantity("speed", "speed", "speed\nkm/h", "km/h", "speed", 1, "speed_kmh"),
-    Quantity("slip_angle", "slip_angle", "slip\nangle\ndeg", "deg", "angle", 1, "slip_angle_deg"),
-    Quantity("camber", "camber", "camber\ndeg", "deg", "angle", 1, "camber_deg"),
-    Quantity("slip_ratio", "slip_ratio", "slip\nratio\n1", "1", "ratio", 2, "slip_ratio"),
-    Quantity("Fx", "", "Fx\nN", "N", "force", 0, "Fx_N"),
-    Quantity("Fy", "", "Fy\nN", "N", "force", 0, "Fy_N"),
-    Quantity("Mz", "", "Mz\nNm", "Nm", "moment", 0, "Mz_Nm"),
+    Column("Fz", "load", "Fz\nN", "N", "force", 0, "Fz_N"),
+    Column("pressure", "pressure", "pressure\nbar", "bar", "pressure", 2, "pressure_bar"),
+    Column("speed", "speed", "speed\nkm/h", "km/h", "speed", 1, "speed_kmh"),
+    Column("slip_angle", "slip_angle", "slip\nangle\ndeg", "deg", "angle", 1, "slip_angle_deg"),
+    Column("camber", "camber", "camber\ndeg", "deg", "angle", 1, "camber_deg"),
+    Column("slip_ratio", "slip_ratio", "slip\nratio\n1", "1", "ratio", 2, "slip_ratio"),
+    Column("Fx", "", "Fx\nN", "N", "force", 0, "Fx_N"),
+    Column("Fy", "", "Fy\nN", "N", "force", 0, "Fy_N"),
+    Column("Mz", "", "Mz\nNm", "Nm", "moment", 0, "Mz_Nm"),
 )
 """What is shown of each run."""
 

@@ -16,7 +16,7 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.core.parameters import Tire, TireFile, read_tire
 from tirelib.core.units import from_si, to_si
-from tirelib.inference.compare.model import Model, UsedEffect, model_of
+from tirelib.inference.compare.model import TireModel, UsedEffect, model_of
 from tirelib.model.registration import registered_effects
 from tirelib.report.simulation import (
     CONTACTS,
@@ -209,7 +209,7 @@ def simulate(
 
 def _model(
     file: TireFile, ring: str | None, contact: str, effect_files: Sequence[Path]
-) -> Model | None:
+) -> TireModel | None:
     """Return the model of a file with its effects; None for the linear ring of a bare tire.
 
     The contact with tread shear knows the linear ring only.
@@ -246,7 +246,7 @@ def _turn_rate(speed: FloatArray, tire: Tire) -> FloatArray:
 
 
 def _document(
-    file: TireFile, model: str, done: Simulation, notes: Sequence[str], chosen: Model | None
+    file: TireFile, model: str, done: Simulation, notes: Sequence[str], chosen: TireModel | None
 ) -> dict[str, Any]:
     points = [point_document(done, point) for point in range(len(done))]
     document = {
@@ -268,19 +268,19 @@ def _document(
     return document
 
 
-def _acting(model: Model) -> list[UsedEffect]:
+def _acting(model: TireModel) -> list[UsedEffect]:
     """Return the effects of a model that act on the ring."""
     return [used for used in model.used if used.effect.hook != "brush"]
 
 
-def _left_out(file: TireFile, chosen: Model | None) -> list[str]:
+def _left_out(file: TireFile, chosen: TireModel | None) -> list[str]:
     """Return the names of effects that a file has and this simulation does not."""
     names = [str(e.get("effect", e)) for e in file.extra.get("effects", []) if isinstance(e, dict)]
     acting = [] if chosen is None else [used.effect.name for used in _acting(chosen)]
     return [name for name in names if name not in acting]
 
 
-def _notes(file: TireFile, done: Simulation, chosen: Model | None) -> list[str]:
+def _notes(file: TireFile, done: Simulation, chosen: TireModel | None) -> list[str]:
     """Return the notes that a reader of the figures needs."""
     notes, tire = [], done.tire
     if left_out := _left_out(file, chosen):

@@ -48,9 +48,11 @@ from tirelib.effects import (
     tread_load,
     tread_wear,
 )
+from tirelib.effects.brush_state import BrushState
 from tirelib.effects.effect import Effect, effect
+from tirelib.effects.state import State
 
-__all__ = ["CATALOGUE", "Effect", "effect"]
+__all__ = ["CATALOGUE", "BrushState", "Effect", "State", "effect"]
 
 CATALOGUE: Mapping[str, Effect] = MappingProxyType(
     {

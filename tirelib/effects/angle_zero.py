@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
 from tirelib.effects.harmonics import orders, with_gain
+from tirelib.effects.state import State
 
 
 @effect(

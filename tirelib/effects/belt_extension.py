@@ -1,6 +1,7 @@
 """Extension of the belt."""
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
+from tirelib.effects.state import State
 
 LEAST_STRENGTH = 1e-6
 """Strength below which the effect is left out: beyond 1e12 N the stiffness would drown in

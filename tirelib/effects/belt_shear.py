@@ -3,7 +3,8 @@
 import numpy as np
 
 from tirelib.core.errors import ParameterError
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
+from tirelib.effects.state import State
 
 LEAST_STRENGTH = 1e-9
 """Strength below which the effect is left out: beyond 1e12 N the stiffness would drown in

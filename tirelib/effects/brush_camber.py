@@ -1,6 +1,7 @@
 """Lateral force from camber."""
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 
 @effect(
@@ -12,7 +13,7 @@ from tirelib.effects.effect import State, effect
     varies_with=("camber",),
     source="Pacejka, Tire and Vehicle Dynamics, ch. 3: camber as a turned line of the contact",
 )
-def brush_camber(state: State, strength: float) -> State:
+def brush_camber(state: BrushState, strength: float) -> BrushState:
     """Camber acts as a slip angle.
 
     A radian of camber is worth s radians of slip angle: about 0.1 for car tires, 1 on two wheels.

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 
 @effect(
@@ -14,7 +15,7 @@ from tirelib.effects.effect import State, effect
     varies_with=("slip_angle",),
     source="dissertation, Eq. (2): 1 / C_yaw of the belt's line in the contact",
 )
-def carcass(state: State, strength: float) -> State:
+def carcass(state: BrushState, strength: float) -> BrushState:
     """Contact that turns under its aligning moment, which lowers the slip angle.
 
     The slip angle falls by s Mz, in balance with the Mz that results.

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 
 @effect(
@@ -14,7 +15,7 @@ from tirelib.effects.effect import State, effect
     varies_with=("slip_angle", "slip_ratio"),
     source="friction ellipse: adhesion along and across the wheel differ (Pacejka, ch. 3)",
 )
-def combined_slip(state: State, strength: float) -> State:
+def combined_slip(state: BrushState, strength: float) -> BrushState:
     """Friction along the wheel differs from that across.
 
     mu times 1 + s kappa^2 / (kappa^2 + tan^2 alpha): unchanged in pure cornering.

@@ -1,6 +1,7 @@
 """Lateral force at zero slip that does not depend on the direction of rolling."""
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 
 @effect(
@@ -13,7 +14,7 @@ from tirelib.effects.effect import State, effect
     source="Pacejka, Tire and Vehicle Dynamics, ch. 4: conicity as a lateral force that keeps its "
     "side",
 )
-def conicity(state: State, strength: float) -> State:
+def conicity(state: BrushState, strength: float) -> BrushState:
     """Belt as a cone that pushes to one side, more with load.
 
     Fy plus s Fz, whatever the slip and the direction of rolling.

@@ -4,12 +4,16 @@ import re
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from tirelib.core.errors import ParameterError, TirelibError
 from tirelib.core.units import TABLE
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.state import State
+
+S = TypeVar("S")
 
 HOOKS = {
     "stiffness": "constants",
@@ -41,10 +45,14 @@ VARIES_WITH = frozenset(
 UNITS = frozenset(row.unit for row in TABLE) | {"MN"}
 """Parts of which a strength's unit may consist, with blanks, `/` and `^`."""
 
-State = Any
-"""`tirelib.model.state.State`, which this layer does not know; the brush has its own."""
 Strength = float | Sequence[float]
-Law = Callable[[State, Any], State]
+Law = (
+    Callable[[State, float], State]
+    | Callable[[State, Sequence[float]], State]
+    | Callable[[BrushState, float], BrushState]
+    | Callable[[BrushState, Sequence[float]], BrushState]
+)
+"""A law of the strain, or of stage brush; its strength is a number, or one of each component."""
 
 TRIAL = 1e-3
 """Strength of a trial step, relative to the range."""
@@ -70,7 +78,7 @@ class Effect:
         is dead or has twins.
     source : str
     law : callable
-        (state, strength) -> changed state.
+        (state, strength) -> changed state, see `Law`.
     components : int
         How many numbers the strength has; more than one where a phase is unknown as well
         (cosine, sine), or a form. The law then takes a sequence.
@@ -93,7 +101,7 @@ class Effect:
     high: float
     varies_with: tuple[str, ...]
     source: str
-    law: Law
+    law: Callable[[Any, Any], Any]
     components: int = 1
     needs: tuple[str, ...] = ()
     untestable: str = ""
@@ -172,7 +180,7 @@ class Effect:
             name for name in self.needs if not np.isfinite(getattr(conditions, name)).all()
         )
 
-    def at(self, strength: Strength) -> tuple[str, Callable[[State], State]]:
+    def at(self, strength: Strength) -> tuple[str, Callable[[Any], Any]]:
         """Return hook and change for the chain at one strength.
 
         The change raises `ParameterError` with name, file and line if the law fails, returns no
@@ -187,7 +195,7 @@ class Effect:
             )
         return self.hook, lambda state: self._change(state, strength)
 
-    def _change(self, state: State, strength: Strength) -> State:
+    def _change(self, state: S, strength: Strength) -> S:
         missing = self.unknown(getattr(state, "conditions", None)) if self.needs else ()
         if missing:
             raise ParameterError(
@@ -196,7 +204,7 @@ class Effect:
             )
         where = f"effect {self.name!r}, {self.origin}"
         try:
-            changed = self.law(state, strength)
+            changed: S = self.law(state, strength)
         except TirelibError as error:
             error.add_note(f"in {where}, strength {strength}")
             raise
@@ -217,7 +225,7 @@ class Effect:
         return changed
 
 
-def _faults(before: State, after: State) -> list[str]:
+def _faults(before: S, after: S) -> list[str]:
     """Return what is wrong with the fields that a law has changed."""
     if not is_dataclass(after):
         return []

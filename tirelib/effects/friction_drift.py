@@ -1,8 +1,11 @@
 """Friction that drifts during the campaign."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 
 @effect(
@@ -15,7 +18,7 @@ from tirelib.effects.effect import State, effect
     components=2,
     source="wear and polish of tread and road during a test (assumed size)",
 )
-def friction_drift(state: State, strength: tuple[float, float]) -> State:
+def friction_drift(state: BrushState, strength: Sequence[float]) -> BrushState:
     """Friction drifts from the first run to the last.
 
     mu times exp(s1 x / 2 + s2 (x^2 - 1/3)), x from -1 at the first point to 1 at the last: s1 is

@@ -1,6 +1,7 @@
 """Friction over load."""
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 
 @effect(
@@ -12,7 +13,7 @@ from tirelib.effects.effect import State, effect
     varies_with=("load",),
     source="rubber friction: the true contact area grows less than the load (Schallamach)",
 )
-def friction_load(state: State, strength: float) -> State:
+def friction_load(state: BrushState, strength: float) -> BrushState:
     """Friction falls with load.
 
     mu times (Fz / Fz0)^(-s); 1/3 for smooth elastic spheres on a plane.

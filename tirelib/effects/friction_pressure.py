@@ -1,6 +1,7 @@
 """Friction over inflation pressure."""
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 
 @effect(
@@ -14,7 +15,7 @@ from tirelib.effects.effect import State, effect
     source="Besselink et al., An improved Magic Formula/Swift tyre model, 2010: pressure terms of "
     "peak friction",
 )
-def friction_pressure(state: State, strength: float) -> State:
+def friction_pressure(state: BrushState, strength: float) -> BrushState:
     """Friction changes with inflation pressure.
 
     mu times (p / p0)^(-s): higher contact pressure lowers it, more even pressure raises it.

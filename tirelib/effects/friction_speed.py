@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 SPAN = 10.0
 """Sliding speed that the strength stands for, [m/s]."""
@@ -18,7 +19,7 @@ SPAN = 10.0
     needs=("speed",),
     source="Savkoor, 1966: friction of sliding rubber over speed",
 )
-def friction_speed(state: State, strength: float) -> State:
+def friction_speed(state: BrushState, strength: float) -> BrushState:
     """Friction falls with the speed at which the tread slides.
 
     mu times exp(-s v_s / (10 m/s)), v_s = v sqrt(kappa^2 + tan^2 alpha).

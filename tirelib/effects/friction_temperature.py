@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 REFERENCE, SPAN = 323.15, 50.0
 """Temperature at which nothing changes, and warming that the strength stands for, [K]."""
@@ -19,7 +20,7 @@ REFERENCE, SPAN = 323.15, 50.0
     source="rubber friction over temperature and speed has one peak (Grosch); below it friction "
     "rises, above it falls",
 )
-def friction_temperature(state: State, strength: float) -> State:
+def friction_temperature(state: BrushState, strength: float) -> BrushState:
     """Friction changes as the tread warms up.
 
     mu times exp(-s (T - 50 degC) / 50 K), T of the tread; s < 0 below the rubber's best.

@@ -1,6 +1,7 @@
 """Drift of the gage's gain during the campaign."""
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
+from tirelib.effects.state import State
 
 
 @effect(

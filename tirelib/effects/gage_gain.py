@@ -1,6 +1,7 @@
 """Gain of the gage."""
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
+from tirelib.effects.state import State
 
 
 @effect(

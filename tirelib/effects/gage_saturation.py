@@ -3,7 +3,8 @@
 import numpy as np
 
 from tirelib.core.errors import ParameterError
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
+from tirelib.effects.state import State
 
 REFERENCE = 5e-3
 """Strain at which the strength is the lost share, [-]."""

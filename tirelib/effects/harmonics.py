@@ -1,10 +1,12 @@
 """Factors on each harmonic of the waveform: lag, length and place of a gage."""
 
-import numpy as np
+from typing import Any
 
-from tirelib.core.arrays import FloatArray, IntArray
-from tirelib.effects.effect import State
-from tirelib.physics.ring.ring import ComplexArray
+import numpy as np
+from numpy.typing import NDArray
+
+from tirelib.core.arrays import IntArray
+from tirelib.effects.state import State
 
 
 def orders(state: State) -> IntArray:
@@ -12,7 +14,7 @@ def orders(state: State) -> IntArray:
     return np.arange(state.phi.size // 2 + 1)
 
 
-def with_gain(state: State, gain: FloatArray | ComplexArray) -> State:
+def with_gain(state: State, gain: NDArray[np.inexact[Any]]) -> State:
     """Return a state whose waveform's harmonics are multiplied by gains.
 
     The measured waveform is filtered as a whole, what large displacements add to it included; so

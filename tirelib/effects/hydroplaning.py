@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
 from tirelib.effects.patch import along, inward, pressed_again
+from tirelib.effects.state import State
 
 WATER = 1000.0
 """Density, [kg/m^3]."""

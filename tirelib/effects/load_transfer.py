@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
+from tirelib.effects.state import State
 from tirelib.physics.contact.radial import press
 
 DEG_PER_KN = np.deg2rad(1.0) / 1e3

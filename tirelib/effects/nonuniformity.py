@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
+from tirelib.effects.state import State
 
 
 @effect(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.effects.effect import State
+from tirelib.effects.state import State
 from tirelib.physics.contact.fourier import load_harmonics
 from tirelib.physics.contact.radial import RadialContact, load
 from tirelib.physics.ring.ring import ComplexArray

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 
 @effect(
@@ -15,7 +16,7 @@ from tirelib.effects.effect import State, effect
     needs=("speed",),
     source="Pacejka, Tire and Vehicle Dynamics, ch. 4: ply-steer as an offset of the slip angle",
 )
-def ply_steer(state: State, strength: float) -> State:
+def ply_steer(state: BrushState, strength: float) -> BrushState:
     """Plies of the belt steer the tire, the other way when it rolls backward.
 
     The slip angle plus s times the sign of the speed.

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 
 @effect(
@@ -15,7 +16,7 @@ from tirelib.effects.effect import State, effect
     needs=("speed", "slip_rate"),
     source="Pacejka, Tire and Vehicle Dynamics, ch. 7: first-order lag over the relaxation length",
 )
-def relaxation(state: State, strength: float) -> State:
+def relaxation(state: BrushState, strength: float) -> BrushState:
     """Slip at the bristles lags by a rolled distance.
 
     alpha - (s / v) d alpha / dt: the lag of first order in a slow sweep, nothing in steady runs.

@@ -1,6 +1,7 @@
 """Contact pressure of the ring in place of the brush's parabola."""
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 
 @effect(
@@ -12,7 +13,7 @@ from tirelib.effects.effect import State, effect
     varies_with=("slip_angle", "slip_ratio"),
     source="dissertation, section 6.6: the flexible ring's pressure in the brush model",
 )
-def ring_pressure(state: State, strength: float) -> State:
+def ring_pressure(state: BrushState, strength: float) -> BrushState:
     """Contact pressure is flatter than a parabola.
 
     p times (1 + c x^2) / (1 + c / 5), x = -1 .. 1 over the contact, c = s c_ring: 1 is the pressure

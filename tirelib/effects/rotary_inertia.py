@@ -1,6 +1,7 @@
 """Rotary inertia of the belt's cross-section."""
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
+from tirelib.effects.state import State
 
 
 @effect(

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
 from tirelib.effects.patch import inward, pressed_again
+from tirelib.effects.state import State
 from tirelib.physics.contact.fourier import evaluate
 
 

@@ -1,6 +1,7 @@
 """Damping of the sidewall."""
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
+from tirelib.effects.state import State
 
 
 @effect(

@@ -1,6 +1,7 @@
 """Radial sidewall stiffness over deflection."""
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
+from tirelib.effects.state import State
 
 FALL = 0.020
 """Displacement by which the tangent stiffness falls to exp(-s), [m]."""

@@ -1,8 +1,11 @@
 """Stiffness that drifts during the campaign."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 
 @effect(
@@ -15,7 +18,7 @@ from tirelib.effects.effect import State, effect
     components=2,
     source="E b / h: a tread that wears gets stiffer; wear during a test (assumed size)",
 )
-def stiffness_drift(state: State, strength: tuple[float, float]) -> State:
+def stiffness_drift(state: BrushState, strength: Sequence[float]) -> BrushState:
     """Stiffness of the bristles drifts from the first run to the last.
 
     c_p times exp(s1 x / 2 + s2 (x^2 - 1/3)), x from -1 at the first point to 1 at the last: s1 is

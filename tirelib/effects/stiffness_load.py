@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 
 @effect(
@@ -15,7 +16,7 @@ from tirelib.effects.effect import State, effect
     source="Pacejka, Tire and Vehicle Dynamics, ch. 4: cornering stiffness less than in proportion "
     "to load",
 )
-def stiffness_load(state: State, strength: float) -> State:
+def stiffness_load(state: BrushState, strength: float) -> BrushState:
     """Stiffness of the bristles falls with load.
 
     c_py and c_px times exp(-s (Fz / Fz0 - 1)). Where no ring gives the contact's length the base

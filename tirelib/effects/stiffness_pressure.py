@@ -1,6 +1,7 @@
 """Bristle stiffness over inflation pressure."""
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 
 @effect(
@@ -14,7 +15,7 @@ from tirelib.effects.effect import State, effect
     source="Besselink et al., An improved Magic Formula/Swift tyre model, 2010: pressure terms of "
     "slip stiffness",
 )
-def stiffness_pressure(state: State, strength: float) -> State:
+def stiffness_pressure(state: BrushState, strength: float) -> BrushState:
     """Stiffness of the contact changes with inflation pressure.
 
     c_py and c_px times (p / p0)^s: a shorter contact lowers it, a stiffer carcass raises it.

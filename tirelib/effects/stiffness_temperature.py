@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.brush_state import BrushState
+from tirelib.effects.effect import effect
 
 REFERENCE, SPAN = 323.15, 50.0
 """Temperature at which nothing changes, and warming that the strength stands for, [K]."""
@@ -18,7 +19,7 @@ REFERENCE, SPAN = 323.15, 50.0
     needs=("temperature",),
     source="assumed: rubber modulus falls by some 10 % per 20 K above room temperature",
 )
-def stiffness_temperature(state: State, strength: float) -> State:
+def stiffness_temperature(state: BrushState, strength: float) -> BrushState:
     """Tread rubber softens as it warms up.
 
     c_py and c_px times exp(-s (T - 50 degC) / 50 K), T of the tread.

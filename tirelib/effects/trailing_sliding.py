@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
 from tirelib.effects.patch import along, balanced, sheared
+from tirelib.effects.state import State
 
 START, WIDTH = 0.5, 0.2
 """Where sliding begins, in half contacts behind the middle, and over which length."""

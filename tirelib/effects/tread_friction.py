@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
 from tirelib.effects.patch import along, balanced, beam_strain, held_shear, sheared
+from tirelib.effects.state import State
 from tirelib.physics.strain.innerliner import strain_harmonics
 
 BUILT_UP = 1.0 / 3.0

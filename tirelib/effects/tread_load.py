@@ -1,6 +1,7 @@
 """Tread stiffness over load."""
 
-from tirelib.effects.effect import State, effect
+from tirelib.effects.effect import effect
+from tirelib.effects.state import State
 
 REFERENCE = 4000.0
 """Load at which the base model's k_t holds, [N]."""

@@ -7,10 +7,10 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import FIELDS, Tire
+from tirelib.effects.state import Operating, State
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID, Waveforms
 from tirelib.model.chain import Changes, waveform
-from tirelib.model.state import Operating, State
 from tirelib.physics.contact.free_boundary import Start
 
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.effects import Effect
-from tirelib.model.brush import BrushConditions, brush_forces, brush_state
+from tirelib.effects.brush_state import BrushConditions
+from tirelib.model.brush import brush_forces, brush_state
 from tirelib.physics.brush.predict import PointParameters
 
 POINTS = 300

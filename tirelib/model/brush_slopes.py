@@ -11,7 +11,8 @@ so that the balance with the carcass is not solved again.
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.model.brush import BrushState, brush_forces
+from tirelib.effects.brush_state import BrushState
+from tirelib.model.brush import brush_forces
 from tirelib.physics.brush.predict import PointForces
 
 STEP = 1e-6

@@ -13,8 +13,8 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError
+from tirelib.effects.state import CONSTANTS, State
 from tirelib.measured.signal import LowPass
-from tirelib.model.state import CONSTANTS, State
 from tirelib.physics.contact import radial
 from tirelib.physics.ring.compliance import compliance
 from tirelib.physics.strain.innerliner import strain_harmonics
@@ -106,7 +106,6 @@ def course(state: State, changes: Changes, known: Course = ()) -> list[tuple[Cha
 
 
 def _with_strain(state: State) -> State:
-    assert state.belt is not None  # noqa: S101 - a pressed state has it
     return state.but(strain=strain_harmonics(state.belt, state.radius, state.offset))
 
 
@@ -163,7 +162,6 @@ def filtered(state: State, low_pass: LowPass) -> State:
 
 def _waveform(state: State, low_pass: LowPass) -> FloatArray:
     """Return the strain as the signal chain gives it: Gaussian low-pass, mean over the turn off."""
-    assert state.strain is not None  # noqa: S101 - set by the caller
     n = np.arange(1, state.strain.shape[1])
     sigma = np.broadcast_to(low_pass.sigma(1.0), (state.strain.shape[0],))
     if low_pass.cut_off is not None:

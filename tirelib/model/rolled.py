@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.model.state import Operating
+from tirelib.effects.state import Operating
 from tirelib.physics.rolling.assemble import Unknowns, by_element, changed, differ, fields
 from tirelib.physics.rolling.constants import Constants
 from tirelib.physics.rolling.gage import Gage, same_place, strain, strain_along

@@ -7,6 +7,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
+from tirelib.effects.state import READ, Operating, State
 from tirelib.model.base import Coordinate, smoothed
 from tirelib.model.chain import Change, Changes, Course, course, filtered, strained
 from tirelib.model.rolled import STEP, RolledSlopes, rolled_slopes
@@ -23,7 +24,6 @@ from tirelib.model.solution import (
     shown_at_gage,
     split,
 )
-from tirelib.model.state import READ, Operating, State
 from tirelib.physics.rolling.assemble import Unknowns
 
 SMALL = 1e-4

@@ -14,6 +14,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError
+from tirelib.effects.state import Operating, State
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import smoothed
@@ -30,7 +31,6 @@ from tirelib.model.chain import (
     strained,
 )
 from tirelib.model.rolled import Made, made_of
-from tirelib.model.state import Operating, State
 from tirelib.physics.contact.free_boundary import Start
 from tirelib.physics.rolling.assemble import Unknowns
 from tirelib.physics.rolling.constants import STIFFEST, Constants

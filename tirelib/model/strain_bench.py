@@ -8,9 +8,9 @@ import numpy as np
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import Tire
 from tirelib.effects import Effect
+from tirelib.effects.state import Operating, State
 from tirelib.model.base import FREE, linearised, move, predict, values_of
 from tirelib.model.chain import Change, Changes
-from tirelib.model.state import Operating, State
 
 DEAD = 1e-7
 """Rms strain below which an effect at the end of its range is dead, [-]."""

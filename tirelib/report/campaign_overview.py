@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tirelib.campaign.model import CampaignHeader, FloatArray, Run
-from tirelib.campaign.overview import COLUMNS, Quantity, RunRow, place_label
+from tirelib.campaign.overview import COLUMNS, Column, RunRow, place_label
 from tirelib.campaign.turns import trigger_samples, turn_samples
 from tirelib.core.units import from_si
 from tirelib.report.style import new_figure
@@ -88,7 +88,7 @@ def _sweep_points(runs: Sequence[Run]) -> dict[str, FloatArray]:
     return {name: np.concatenate(parts) if parts else np.empty(0) for name, parts in points.items()}
 
 
-def _scale(column: Quantity) -> float:
+def _scale(column: Column) -> float:
     return from_si(1.0, column.unit, column.dimension)
 
 

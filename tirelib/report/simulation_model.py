@@ -13,11 +13,11 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.core.parameters import FIELDS, Tire
 from tirelib.core.threads import one_thread
-from tirelib.inference.compare.model import Model
+from tirelib.effects.state import Operating, State
+from tirelib.inference.compare.model import TireModel
 from tirelib.measured.signal import LowPass
 from tirelib.model.base import predict
 from tirelib.model.solution import Solution, solved
-from tirelib.model.state import Operating, State
 from tirelib.physics.ring.ring import ComplexArray
 from tirelib.report.simulation import (
     N_ANGLES,
@@ -36,7 +36,7 @@ DEFLECTION_SETTLED, MOST_SOLVES = 1e-8, 30
 
 
 def simulate_file(
-    model: Model,
+    model: TireModel,
     tire: Tire,
     *,
     load: FloatArray | None = None,
@@ -117,7 +117,7 @@ class Conditions:
 
 @one_thread()
 def simulate_model(
-    model: Model,
+    model: TireModel,
     tire: Tire,
     conditions: Conditions,
     *,
@@ -129,7 +129,7 @@ def simulate_model(
 
     Parameters
     ----------
-    model : Model
+    model : TireModel
     tire : Tire
         The model's, with the damping that is to be simulated.
     conditions : Conditions
@@ -157,7 +157,7 @@ def simulate_model(
     return _simulation(tire, curves, found.deflection, points)
 
 
-def _check_known(model: Model, conditions: Conditions) -> None:
+def _check_known(model: TireModel, conditions: Conditions) -> None:
     wants = [u.effect.name for u in model.used if u.effect.varies_with == ("temperature",)]
     if wants and not np.isfinite(conditions.temperature).all():
         raise ParameterError(
@@ -167,7 +167,7 @@ def _check_known(model: Model, conditions: Conditions) -> None:
 
 
 def _pressed(
-    model: Model, values: Mapping[str, float | FloatArray], points: Operating, low_pass: LowPass
+    model: TireModel, values: Mapping[str, float | FloatArray], points: Operating, low_pass: LowPass
 ) -> Solution | State:
     """Return the rolling ring over `TURN` as `compare` predicts it, or the linear ring."""
     solve = solved if model.large else predict
@@ -175,7 +175,7 @@ def _pressed(
 
 
 def _load_at(
-    model: Model,
+    model: TireModel,
     values: Mapping[str, float | FloatArray],
     conditions: Conditions,
     deflection: FloatArray,

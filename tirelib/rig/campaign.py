@@ -26,7 +26,7 @@ from tirelib.rig.observe import Forces, edges, forces, trace
 from tirelib.rig.plans import Plan, kind, with_repeats
 from tirelib.rig.ramp import Nominal, Point, Ramp, changed, dense, points_of, set_point
 from tirelib.rig.shown import Shown, fixed_angle
-from tirelib.rig.solve import State, solve
+from tirelib.rig.solve import RigState, solve
 from tirelib.rig.tire import NEW_DEPTH, Array, Condition, RigTire, on_road
 
 TRUTH_FILE = "truth.csv"
@@ -94,10 +94,10 @@ class Job:
 class _Worker:
     """States that a process starts from; set once per process."""
 
-    references: tuple[State, ...] = ()
+    references: tuple[RigState, ...] = ()
 
 
-def _prepare(references: tuple[State, ...]) -> None:
+def _prepare(references: tuple[RigState, ...]) -> None:
     grid = mesh()
     _Worker.references = tuple(replace(s, grid=grid) for s in references)
 
@@ -117,7 +117,7 @@ def _make(job: Job) -> tuple[Recording, tuple[Truth, ...]]:
     return record(stages, job.chain, job.seed, job.run), tuple(truths)
 
 
-def _pass(job: Job, point: Point, start: State) -> tuple[Stage, Truth]:
+def _pass(job: Job, point: Point, start: RigState) -> tuple[Stage, Truth]:
     cond = point.condition
     tire = on_road(_Worker.references[0].tire, cond)
     for name, strength in job.planted:
@@ -147,7 +147,7 @@ def _pass(job: Job, point: Point, start: State) -> tuple[Stage, Truth]:
     return Stage(state, seen, force, point.time), truth
 
 
-def references(tire: RigTire, conditions: tuple[Condition, ...]) -> tuple[State, ...]:
+def references(tire: RigTire, conditions: tuple[Condition, ...]) -> tuple[RigState, ...]:
     """Solve a straight, freely rolling state for each load of a plan.
 
     Every run starts from one of these, so that its result does not depend on the other runs.

@@ -6,7 +6,6 @@ history of a material point act in the frequency domain: rolling at Omega, harmo
 fields is a vibration with n Omega at the material point.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -18,11 +17,6 @@ from tirelib.rig.belt import FIELDS, PSI, SIZE, U, V
 from tirelib.rig.mesh import Mesh
 from tirelib.rig.road import Road
 from tirelib.rig.tire import Array, Condition, RigTire
-
-BeltLaw = Callable[[RigTire, Condition, float, Mesh, Array], Array]
-"""(tire, condition, Omega, mesh, fields) -> residual density, shape (n_gauss, 32)."""
-RoadLaw = Callable[[RigTire, Condition, Array, Road], Road]
-"""(tire, condition, angles of the contact points, contact) -> contact with changed tractions."""
 
 Gain = NDArray[Any]
 """Factors of harmonics 1 .. HARMONICS, real or complex."""

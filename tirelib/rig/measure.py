@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tirelib.campaign import BoolArray
 from tirelib.rig.observe import Forces, Trace, winding
-from tirelib.rig.solve import State
+from tirelib.rig.solve import RigState
 from tirelib.rig.tire import N_STRIPS, Array, Condition, RigTire
 
 
@@ -67,7 +67,7 @@ class Gages:
 class Stage:
     """A solved state, what it shows, and the time at which the wheel passes through it [s]."""
 
-    state: State
+    state: RigState
     trace: Trace
     force: Forces
     time: float = 0.0
@@ -112,7 +112,7 @@ def settle(nominal: Condition, chain: MeasuringChain, seed: int, run: int) -> Co
     )
 
 
-def slip_ratio(state: State) -> float:
+def slip_ratio(state: RigState) -> float:
     """Return kappa = (Omega R_e - v) / v of a state, v the travel speed.
 
     A wheel that rolls freely at a slip angle alpha turns at v cos(alpha) / R_e, so it reads

@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 
 from tirelib.rig.belt import innerliner_strain
 from tirelib.rig.road import Road, road, wheel_torque
-from tirelib.rig.solve import State
+from tirelib.rig.solve import RigState
 from tirelib.rig.system import fields_at_points
 from tirelib.rig.tire import Array
 from tirelib.rig.tread import kinematics
@@ -46,13 +46,13 @@ class Trace:
     by_load: Array
 
 
-def contact(state: State) -> Road:
+def contact(state: RigState) -> Road:
     """Contact at the Gauss points."""
     z = fields_at_points(state.grid, state.control)
     return road(state.tire, state.condition, state.grid, z, state.height, state.rolling_radius)
 
 
-def forces(state: State) -> Forces:
+def forces(state: RigState) -> Forces:
     """Integrate the contact."""
     c = contact(state)
     x, y = c.kin.x, c.kin.y
@@ -66,7 +66,7 @@ def forces(state: State) -> Forces:
     )
 
 
-def edges(state: State, points: int = 4001) -> tuple[Array, Array]:
+def edges(state: RigState, points: int = 4001) -> tuple[Array, Array]:
     """Contact edges of the strips under the gages.
 
     Returns
@@ -94,7 +94,7 @@ def edges(state: State, points: int = 4001) -> tuple[Array, Array]:
     return angle + winding(state), length
 
 
-def winding(state: State) -> float:
+def winding(state: RigState) -> float:
     """Angle by which the belt runs ahead of the rim at the wheel's top [rad].
 
     The rig's trigger marks the gages at the top, so their angle counts from there.
@@ -104,7 +104,7 @@ def winding(state: State) -> float:
     return v / (state.tire.ring_radius + u)
 
 
-def trace(state: State, points: int = 7200) -> Trace:
+def trace(state: RigState, points: int = 7200) -> Trace:
     """Evaluate strain, slope and load sensitivity on an even grid of gage angles.
 
     Strain is taken at the Gauss points, where it is most accurate, and joined by a periodic cubic
@@ -120,7 +120,7 @@ def trace(state: State, points: int = 7200) -> Trace:
     return Trace(phi, strain, np.asarray(base(at, 1)), (more(at) - strain) / nudge)
 
 
-def _strain_spline(state: State, control: Array) -> CubicSpline:
+def _strain_spline(state: RigState, control: Array) -> CubicSpline:
     strain = innerliner_strain(state.tire, fields_at_points(state.grid, control))
     phi = state.grid.phi
     turn = np.append(phi, phi[0] + 2.0 * np.pi)

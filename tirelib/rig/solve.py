@@ -40,7 +40,7 @@ class SolverError(TirelibError, RuntimeError):
 
 
 @dataclass(frozen=True)
-class State:
+class RigState:
     """A steady rolling state.
 
     Attributes
@@ -60,7 +60,7 @@ class State:
         Vertical stiffness, -d load / d height [N/m].
     steps : int
         Newton steps taken.
-    straight : State or None
+    straight : RigState or None
         The straight, freely rolling state that defines R_e, where this is another.
     """
 
@@ -74,7 +74,7 @@ class State:
     by_load: Array
     stiffness: float
     steps: int
-    straight: "State | None" = None
+    straight: "RigState | None" = None
 
     @property
     def omega(self) -> float:
@@ -101,9 +101,9 @@ def inflated(tire: RigTire, pressure: float, omega: float) -> float:
 def solve(
     tire: RigTire,
     cond: Condition,
-    start: State | None = None,
+    start: RigState | None = None,
     grid: Mesh | None = None,
-) -> State:
+) -> RigState:
     """Find the steady state of a condition.
 
     Parameters
@@ -152,7 +152,7 @@ def _check(cond: Condition) -> None:
             )
 
 
-def _from_unloaded(tire: RigTire, cond: Condition, grid: Mesh) -> State:
+def _from_unloaded(tire: RigTire, cond: Condition, grid: Mesh) -> RigState:
     """Lower the inflated tire onto the road in steps of deflection."""
     straight = replace(cond, slip_angle=0.0, camber=0.0, slip_ratio=None)
     rolling = tire.free_radius
@@ -160,7 +160,7 @@ def _from_unloaded(tire: RigTire, cond: Condition, grid: Mesh) -> State:
     control[:, U] = inflated(tire, cond.pressure, cond.speed / rolling)
     top = tire.free_radius + control[0, 0]
     zero = np.zeros_like(control)
-    state = State(tire, straight, grid, control, top, rolling, rolling, zero, 0.0, 0)
+    state = RigState(tire, straight, grid, control, top, rolling, rolling, zero, 0.0, 0)
     for deflection in FIRST_DEFLECTIONS:
         state = replace(state, height=top - deflection)
         state = _newton(tire, straight, state, None, top - deflection)
@@ -168,8 +168,8 @@ def _from_unloaded(tire: RigTire, cond: Condition, grid: Mesh) -> State:
 
 
 def _approach(
-    tire: RigTire, cond: Condition, start: State, free_radius: float | None = None
-) -> State:
+    tire: RigTire, cond: Condition, start: RigState, free_radius: float | None = None
+) -> RigState:
     """Newton from a start, halving the way to the condition where it fails."""
     try:
         return _newton(tire, cond, start, free_radius)
@@ -178,8 +178,8 @@ def _approach(
 
 
 def _halve(
-    tire: RigTire, cond: Condition, start: State, free_radius: float | None, left: int
-) -> State:
+    tire: RigTire, cond: Condition, start: RigState, free_radius: float | None, left: int
+) -> RigState:
     was = start.condition
     if left == 0:
         raise SolverError(
@@ -208,10 +208,10 @@ def _halve(
 def _newton(
     tire: RigTire,
     cond: Condition,
-    start: State,
+    start: RigState,
     free_radius: float | None = None,
     fixed_height: float | None = None,
-) -> State:
+) -> RigState:
     grid, control = start.grid, start.control
     height, rolling = start.height, start.rolling_radius
     target = None
@@ -255,7 +255,7 @@ def _newton(
         if largest < TOLERANCE:
             _check_zone(cond, now)
             by_load = _by_load(now, apply)
-            return State(
+            return RigState(
                 tire=tire,
                 condition=cond,
                 grid=grid,

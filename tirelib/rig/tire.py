@@ -6,20 +6,23 @@ rubber with temperature would scale `sidewall_*`, `tread_*`; run-out and gage fa
 the measurement (`tirelib.rig.measure`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tirelib.core.errors import ParameterError
-
-if TYPE_CHECKING:
-    from tirelib.rig.laws import BeltLaw, RoadLaw
+from tirelib.rig.mesh import Mesh
 
 Array = NDArray[np.float64]
+BeltLaw = Callable[["RigTire", "Condition", float, Mesh, Array], Array]
+"""(tire, condition, Omega, mesh, fields) -> residual density, shape (n_gauss, 32)."""
+RoadLaw = Callable[["RigTire", "Condition", Array, Any], Any]
+"""(tire, condition, angles of the contact points, contact) -> contact with changed tractions; the
+contact is a `tirelib.rig.road.Road`, which this module does not know."""
 
 N_STRIPS = 5
 
@@ -128,8 +131,8 @@ class RigTire:
     tread_cubic: float = 0.0
     tread_roughness: float = 0.0
     road_curvature: float = 0.0
-    belt_laws: "tuple[BeltLaw, ...]" = ()
-    road_laws: "tuple[RoadLaw, ...]" = ()
+    belt_laws: tuple[BeltLaw, ...] = ()
+    road_laws: tuple[RoadLaw, ...] = ()
 
     def __post_init__(self) -> None:
         for f in fields(self):

@@ -6,7 +6,10 @@ state as JSON. The compiled core does it (`compiled`); `reference` does the same
 only, and runs inside a Python FMU.
 """
 
+from tirelib.stream.compiled import CompiledEstimator
 from tirelib.stream.estimate import TurnEstimate
 from tirelib.stream.estimator import StreamEstimator
+from tirelib.stream.reference import NumpyEstimator
 
+StreamEstimator.kinds = (CompiledEstimator, NumpyEstimator)
 __all__ = ["StreamEstimator", "TurnEstimate"]

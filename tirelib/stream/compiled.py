@@ -20,6 +20,7 @@ from tirelib.core.compiled import (
 from tirelib.core.errors import FormatError
 from tirelib.core.flags import TurnFlag
 from tirelib.core.held import HELD, Held
+from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.compiled import core_calibration, estimates_of
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.measured.features.compiled import attributes_of
@@ -41,6 +42,11 @@ class CompiledEstimator(StreamEstimator):
     FormatError
         If there is no core for this machine, or it does not know the calibration.
     """
+
+    @classmethod
+    def knows(cls, calibration: Calibration) -> bool:
+        """Return whether there is a core for this machine that knows the calibration."""
+        return core_calibration(calibration) is not None
 
     def reset(self) -> None:
         """Forget everything but the calibration and the rate."""

@@ -2,13 +2,12 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, Self, Unpack
+from typing import Any, ClassVar, Self, Unpack
 
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import FormatError, ParameterError
 from tirelib.core.held import Held
 from tirelib.estimators.calibration import Calibration
-from tirelib.estimators.compiled import core_calibration
 from tirelib.stream.estimate import TurnEstimate
 
 __all__ = ["RATES", "STANDSTILL", "WATCHDOG_TURNS", "StreamEstimator", "TurnEstimate"]
@@ -55,17 +54,21 @@ class StreamEstimator(ABC):
         If the rate is out of range.
     """
 
+    kinds: ClassVar[tuple[type["StreamEstimator"], ...]] = ()
+    """What can compute; the first that knows the calibration does."""
+
     def __new__(cls, calibration: Calibration, *_: Any, **__: Any) -> Self:
         """Choose what computes."""
         chosen: Any = cls
         if cls is StreamEstimator:
-            from tirelib.stream.compiled import CompiledEstimator  # kinds of this class
-            from tirelib.stream.reference import NumpyEstimator
-
-            known = core_calibration(calibration) is not None
-            chosen = CompiledEstimator if known else NumpyEstimator
+            chosen = next(kind for kind in cls.kinds if kind.knows(calibration))
         made: Self = super().__new__(chosen)
         return made
+
+    @classmethod
+    def knows(cls, calibration: Calibration) -> bool:
+        """Return whether this kind can compute a calibration here."""
+        return True
 
     def __init__(
         self,

@@ -11,7 +11,7 @@ from tirelib.studio.commands import FIRST, planted
 from tirelib.studio.disk import move_into, read_document, write_document
 from tirelib.studio.jobs import Job, Jobs
 from tirelib.studio.receiving import Receiving
-from tirelib.studio.session import QUANTITIES, Model, Opened, Session
+from tirelib.studio.session import QUANTITIES, Opened, Session, StudioModel
 
 EXAMPLE = {"plan": "short", "seed": 1, "hide": ["sidewall_damping=0.05"]}
 """The example: 15 runs of a virtual tire whose sidewall damps more."""
@@ -95,7 +95,7 @@ class Desk:
             opened.change(current=model.number, quantity=None)
         return self._begin(opened).name
 
-    def _quantity(self, opened: Opened, model: Model) -> str:
+    def _quantity(self, opened: Opened, model: StudioModel) -> str:
         """Return what a model is looked at with: the last choice, else what it was fitted to."""
         shown = read_document(opened.place / "show.json") or {}
         gages = (shown.get("header") or {"gage_lateral_mm": [0.0]}).get("gage_lateral_mm")
@@ -240,7 +240,7 @@ class Desk:
                 subject = {"campaign": opened.name, "model": number, "quantity": quantity}
                 self.jobs.add("diagnose", about, subject)
 
-    def _computed(self, opened: Opened, model: Model, quantity: str) -> None:
+    def _computed(self, opened: Opened, model: StudioModel, quantity: str) -> None:
         """Compute what is not known yet of a model: comparison, diagnosis, traces."""
         if not model.ready:
             return
@@ -257,7 +257,7 @@ class Desk:
         if wanted and not model.document("traces.npz", quantity).exists():
             self._once("traces", about | {"traces": wanted}, subject)
 
-    def _about(self, opened: Opened, model: Model, quantity: str) -> dict[str, Any]:
+    def _about(self, opened: Opened, model: StudioModel, quantity: str) -> dict[str, Any]:
         return {
             "campaign": opened.folder,
             "model": str(model.file),
@@ -291,7 +291,7 @@ class Desk:
         under_way = self._under_way("rig", {})
         return {"job": (under_way or [self.jobs.add("rig", EXAMPLE, {})])[0].number}
 
-    def _model(self, wish: Mapping[str, Any]) -> tuple[Opened, Model, str]:
+    def _model(self, wish: Mapping[str, Any]) -> tuple[Opened, StudioModel, str]:
         opened = self.session.campaign(str(wish.get("campaign", "")))
         model = opened.model(str(wish.get("model", "")))
         quantity = str(wish.get("quantity") or opened.told.get("quantity") or "strain")
@@ -314,7 +314,9 @@ class Desk:
             raise ParameterError(f"add: {unknown or 'nothing'} is not in the catalogue; tick one")
         return {"models": [self._add_next(names, opened, model, quantity)]}
 
-    def _add_next(self, names: Sequence[str], opened: Opened, model: Model, quantity: str) -> str:
+    def _add_next(
+        self, names: Sequence[str], opened: Opened, model: StudioModel, quantity: str
+    ) -> str:
         """Add the first of some effects; the others follow when its model is there."""
         new = opened.new_model(model.number, "add", names[0], quantity)
         then = {"then": list(names[1:])} if names[1:] else {}
@@ -332,8 +334,8 @@ class Desk:
         self,
         kind: str,
         opened: Opened,
-        model: Model,
-        new: Model,
+        model: StudioModel,
+        new: StudioModel,
         effect: str,
         quantity: str,
         **more: Any,

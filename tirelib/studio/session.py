@@ -42,7 +42,7 @@ def _stated_name(folder: Path) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Model:
+class StudioModel:
     """A model of a campaign: a folder, and what `model.json` says of it.
 
     Attributes
@@ -116,16 +116,16 @@ class Opened:
         write_atomic(self.place / "campaign.json", json.dumps({**self.told, **values}, indent=1))
 
     @property
-    def models(self) -> list[Model]:
+    def models(self) -> list[StudioModel]:
         """Every model in the order in which they were made."""
         found = []
         for place in sorted((self.place / "models").glob("*")):
             told = read_document(place / "model.json")
             if told is not None:
-                found.append(Model(place, told))
+                found.append(StudioModel(place, told))
         return found
 
-    def model(self, number: str) -> Model:
+    def model(self, number: str) -> StudioModel:
         """Return a model by number.
 
         Raises
@@ -137,9 +137,9 @@ class Opened:
         told = read_document(place / "model.json") if _MODEL.fullmatch(number) else None
         if told is None:
             raise FormatError(f"model {number!r}: no model has this number; choose another")
-        return Model(place, told)
+        return StudioModel(place, told)
 
-    def new_model(self, parent: str | None, action: str, effect: str, quantity: str) -> Model:
+    def new_model(self, parent: str | None, action: str, effect: str, quantity: str) -> StudioModel:
         """Return a new model, which is still to be fitted."""
         number = f"{len(self.models) + 1:03d}"
         place = self.place / "models" / number
@@ -154,13 +154,13 @@ class Opened:
             "hidden": False,
             "made": time.time(),
         }
-        model = Model(place, told)
+        model = StudioModel(place, told)
         model.change()
         return model
 
-    def path_to(self, number: str) -> list[Model]:
+    def path_to(self, number: str) -> list[StudioModel]:
         """Return the models from the base to one."""
-        out: list[Model] = []
+        out: list[StudioModel] = []
         at: str | None = number
         while at is not None and len(out) < 1000:
             out.insert(0, self.model(at))

@@ -9,7 +9,7 @@ from tirelib.studio.desk import Desk
 from tirelib.studio.disk import read_document, safe_name
 from tirelib.studio.jobs import Job
 from tirelib.studio.parts import part_of
-from tirelib.studio.session import DOCUMENTS, QUANTITIES, Model, Opened
+from tirelib.studio.session import DOCUMENTS, QUANTITIES, Opened, StudioModel
 
 SHOWN_JOBS = 40
 
@@ -107,7 +107,7 @@ def _file_name(step: int) -> str:
     return "M.toml" if step == 1 else f"M{step}.toml"
 
 
-def _files(model: Model, step: int) -> dict[str, str]:
+def _files(model: StudioModel, step: int) -> dict[str, str]:
     """Return a model's file in the session, and its and the next one's names by hand."""
     own, following = _file_name(step), _file_name(step + 1)
     return {"file": str(model.file), "saved_as": own, "next_as": following}
@@ -163,7 +163,7 @@ def advice(fit: Mapping[str, Any]) -> list[str]:
     return said + [f"{', '.join(names)}: not determined; {run}" for run, names in helps.items()]
 
 
-def _model(model: Model, quantity: str) -> dict[str, Any]:
+def _model(model: StudioModel, quantity: str) -> dict[str, Any]:
     fit = _part(model.place / "fit.json", _FIT)
     compared = _part(model.document("comparison.json", quantity), _COMPARED)
     diagnosis = _part(model.document("diagnosis.json", quantity), _DIAGNOSED)

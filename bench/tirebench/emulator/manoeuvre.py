@@ -36,7 +36,7 @@ from tirelib.core.units import from_si, to_si
 from tirelib.rig.measure import MeasuringChain, gages
 from tirelib.rig.observe import forces, trace
 from tirelib.rig.ramp import Point, dense
-from tirelib.rig.solve import LIMITS, State, solve
+from tirelib.rig.solve import LIMITS, RigState, solve
 from tirelib.rig.tire import TIRES, Condition, RigTire
 
 FORMAT = "tirebench-manoeuvre/1"
@@ -256,7 +256,7 @@ class Rig:
         self._tire = tire
         self._points = points
         self._known: dict[Condition, tuple[FloatArray, float, dict[str, float]]] = {}
-        self._last: State | None = None
+        self._last: RigState | None = None
 
     def motion(self, path: Sequence[Point]) -> Motion:
         """Return what a wheel shows at each node of its path."""

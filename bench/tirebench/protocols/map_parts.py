@@ -44,7 +44,7 @@ class WheelMap:
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class CarriedQuantity:
     """Where a condition is.
 
     Attributes
@@ -95,7 +95,7 @@ class UserMap:
     rate: float
     wheels: tuple[WheelMap, ...]
     device: Device
-    quantities: tuple[Quantity, ...]
+    quantities: tuple[CarriedQuantity, ...]
     text: str
     messages: tuple[Message, ...] = ()
 

@@ -55,7 +55,7 @@ from typing import Any
 
 from tirebench.errors import DeviceError, cause
 from tirebench.protocols.map_messages import Message, kind_of, listed, of_dbc
-from tirebench.protocols.map_parts import Quantity, UserMap, WheelMap, clashes
+from tirebench.protocols.map_parts import CarriedQuantity, UserMap, WheelMap, clashes
 from tirebench.protocols.signals import Signal
 from tirebench.wire.conditions import HOLD, TELLABLE
 from tirebench.wire.device import Device
@@ -363,7 +363,7 @@ class _Reader:
         zero = tuple(0.0 if s is None else -s.offset / s.factor for s in there)
         return Device("map", step, zero, lowest=low, highest=high)
 
-    def _quantities(self, name: str, messages: Mapping[str, Message]) -> list[Quantity]:
+    def _quantities(self, name: str, messages: Mapping[str, Message]) -> list[CarriedQuantity]:
         given = self.document[name]
         tables = given if isinstance(given, list) else [given]
         if not all(isinstance(table, dict) for table in tables):
@@ -376,7 +376,7 @@ class _Reader:
 
     def _quantity(
         self, name: str, table: dict[str, Any], messages: Mapping[str, Message]
-    ) -> Quantity | None:
+    ) -> CarriedQuantity | None:
         self._known_keys(f"{name}: ", table, _CONDITION_KEYS)
         message = self._message(f"{name}: message", table.get("message"), messages)
         if message is None:
@@ -397,7 +397,7 @@ class _Reader:
                 wheel,
                 "0 .. 255 is needed; leave it out if the value holds for all wheels",
             )
-        return None if signal is None else Quantity(name, message, signal, unit, wheel, hold)
+        return None if signal is None else CarriedQuantity(name, message, signal, unit, wheel, hold)
 
 
 def _is_wheel(number: object) -> bool:

@@ -9,7 +9,7 @@ from tests.unit.identify.model_waves import TIRE, made_waves
 from tirelib.core.parameters import Number, TireFile
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.effects.effect import Strength
-from tirelib.inference.compare.model import Model, model_of
+from tirelib.inference.compare.model import TireModel, model_of
 from tirelib.inference.extend.extension import Extension, extended, refuse, strain_models
 from tirelib.inference.extend.model_file import extended_file
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
@@ -61,7 +61,7 @@ def model_file(*effects: tuple[str, float]) -> TireFile:
     return TireFile("made", numbers, {"effects": listed, "history": []})
 
 
-def add_effect(measured: StraightRuns, model: Model, effect: Effect) -> Extension:
+def add_effect(measured: StraightRuns, model: TireModel, effect: Effect) -> Extension:
     """Return a model with one effect more, fitted to runs."""
     refuse(model, effect)
     return extended(strain_models(measured, model, [effect]), model, effect)

@@ -14,6 +14,7 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
 from tirelib.effects.effect import Effect, effect
+from tirelib.effects.state import State
 from tirelib.inference.compare.error import Yardstick, error_of
 from tirelib.inference.compare.model import model_of
 from tirelib.inference.diagnose.diagnose import plain_tires
@@ -25,7 +26,6 @@ from tirelib.inference.statistics.posterior import Posterior, posterior
 from tirelib.inference.statistics.select import Hypotheses
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import BARE, move, values_of
-from tirelib.model.state import State
 
 DELAY = 4e-5
 FIRST_ORDER, SECOND_ORDER = (0.2, 0.02), (0.3, 0.0)

@@ -5,9 +5,9 @@ import pytest
 
 from tests.unit.diagnose.planted import runs
 from tirelib.core.arrays import FloatArray
+from tirelib.effects.state import Operating
 from tirelib.inference.diagnose.guess import guess_law
 from tirelib.measured.waveforms import GRID
-from tirelib.model.state import Operating
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from tests.unit.identify.model_waves import TIRE
 from tirelib.core.arrays import BoolArray
 from tirelib.effects import CATALOGUE
 from tirelib.inference.compare.error import Yardstick, error_of
-from tirelib.inference.compare.model import Model, model_of
+from tirelib.inference.compare.model import TireModel, model_of
 from tirelib.inference.diagnose.diagnose import plain_tires
 from tirelib.inference.diagnose.document import next_test
 from tirelib.inference.diagnose.fitted import Fitted, fitted
@@ -88,7 +88,7 @@ def test_held_out_errors_are_of_runs_that_the_fit_has_not_seen(
     data = runs().data()
     (load, _), seen = folds(data), []
 
-    def trained(_: Fitted, out: BoolArray) -> tuple[Model, float]:
+    def trained(_: Fitted, out: BoolArray) -> tuple[TireModel, float]:
         seen.append(data.points.load[~out])
         return plain.model, 0.0
 

@@ -8,8 +8,8 @@ import pytest
 from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.core.parameters import read_tire
 from tirelib.effects import CATALOGUE, Effect, effect
+from tirelib.effects.state import State
 from tirelib.model.base import predict, values_of
-from tirelib.model.state import State
 from tirelib.model.strain_bench import reference_plan
 
 TIRE = read_tire("table-6-1").tire

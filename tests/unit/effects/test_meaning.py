@@ -12,11 +12,11 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
 from tirelib.effects.patch import held_shear
+from tirelib.effects.state import State
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import linearised, predict
 from tirelib.model.solution import solved
-from tirelib.model.state import State
 from tirelib.physics.contact.fourier import evaluate
 from tirelib.physics.ring.compliance import compliance
 from tirelib.physics.ring.ring import ComplexArray

@@ -12,8 +12,8 @@ from tirelib.cli.effects import effects
 from tirelib.core.errors import FormatError
 from tirelib.effects import CATALOGUE, Effect, effect
 from tirelib.effects.load import read_effects
+from tirelib.effects.state import State
 from tirelib.model.registration import Registration, register, registered_effects
-from tirelib.model.state import State
 
 DOCS = Path(__file__).parents[3] / "docs/howto/effects.md"
 

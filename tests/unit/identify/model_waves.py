@@ -8,12 +8,12 @@ from tests.synthetic import LATERAL, header
 from tirelib.campaign import Tolerance
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import Tire
+from tirelib.effects.state import Operating
 from tirelib.inference.identify.random_effects import angle_slope
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import CONDITIONS, Waveforms
 from tirelib.model.base import values_of
 from tirelib.model.solution import solved
-from tirelib.model.state import Operating
 
 TIRE = Tire(
     ring_radius=0.302,

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tests.unit.identify.model_waves import TIRE, exact_waveform, made_waves, operating
+from tirelib.effects.state import Operating
 from tirelib.inference.identify import next_run as module
 from tirelib.inference.identify.campaign_data import Data, straight_runs
 from tirelib.inference.identify.laboratory import SIDEWALL, TREAD, laboratory_tests
 from tirelib.inference.identify.next_run import NextRun, next_run
 from tirelib.inference.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
 from tirelib.model.base import BARE, values_of
-from tirelib.model.state import Operating
 
 NAMES = [c.name for c in BARE]
 K_V, K_U_SLOPE, K_T, EI = (

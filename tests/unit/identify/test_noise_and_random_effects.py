@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.unit.identify.model_waves import ANGLE_STD, TIRE, TOLERANCE, made_waves, operating
+from tirelib.effects.state import Operating
 from tirelib.inference.identify.noise import (
     LEAST_NOISE,
     RepeatNoise,
@@ -22,7 +23,6 @@ from tirelib.inference.identify.random_effects import (
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID, N_PHI, Waveforms
 from tirelib.model.base import predict, values_of
-from tirelib.model.state import Operating
 
 NOISE = 1e-5
 LOADS = np.array([2500.0, 4500.0, 6500.0])

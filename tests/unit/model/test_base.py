@@ -11,6 +11,7 @@ from tests.unit.identify.model_waves import TIRE, operating
 from tirelib.core.errors import ConvergenceError
 from tirelib.core.parameters import FIELDS
 from tirelib.effects import CATALOGUE
+from tirelib.effects.state import State
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.model import chain
@@ -23,7 +24,6 @@ from tirelib.model.base import (
     smoothed,
     values_of,
 )
-from tirelib.model.state import State
 
 VALUES = values_of(TIRE)
 POINTS = operating(np.array([2500.0, 4500.0]), np.array([1.8e5, 2.4e5]))

@@ -11,13 +11,13 @@ from tests.unit.identify.model_waves import TIRE, operating
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
+from tirelib.effects.state import READ, State
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import BARE, coordinates, move, predict, values_of
 from tirelib.model.chain import Changes
 from tirelib.model.slopes import SolutionSlopes, added_by_values, by_effects, by_values, slopes_of
 from tirelib.model.solution import Solution, made_with, solved
-from tirelib.model.state import READ, State
 
 VALUES = values_of(TIRE)
 POINTS = operating(np.array([2500.0, 4500.0, 6500.0]), np.array([1.8e5, 2.1e5, 2.4e5]))

@@ -8,6 +8,7 @@ import numpy as np
 from tests.synthetic import LATERAL
 from tests.unit.identify.model_waves import TIRE, made_waves, operating
 from tirelib.effects import CATALOGUE
+from tirelib.effects.state import Operating
 from tirelib.inference.diagnose.diagnose import plain_tires
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.inference.planning.criterion import NextTest
@@ -18,7 +19,6 @@ from tirelib.inference.problems.strain import StrainProblem
 from tirelib.inference.statistics.select import Hypotheses
 from tirelib.model import solution
 from tirelib.model.base import operating_points, values_of
-from tirelib.model.state import Operating
 
 NOISE = 2e-6
 PLANTED, TWIN = "temperature", "dynamic_stiffening"

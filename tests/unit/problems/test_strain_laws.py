@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.unit.identify.model_waves import TIRE, operating
+from tirelib.effects.state import State
 from tirelib.inference.problems.strain_laws import (
     GOES,
     PLACED,
@@ -14,7 +15,6 @@ from tirelib.inference.problems.strain_laws import (
 )
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import PLAIN, values_of
-from tirelib.model.state import State
 
 LOAD = np.array([2000.0, 4000.0, 6000.0])
 POINTS = operating(LOAD, np.full(3, 2.2e5))

@@ -9,7 +9,7 @@ from tirelib.rig.hidden import HIDDEN
 from tirelib.rig.mesh import mesh
 from tirelib.rig.observe import Trace, edges, trace
 from tirelib.rig.shown import Shown
-from tirelib.rig.solve import State, solve
+from tirelib.rig.solve import RigState, solve
 from tirelib.rig.tire import Condition, RigTire
 
 TIRE = RigTire(friction=0.0, sidewall_damping=0.0)
@@ -29,7 +29,7 @@ ON_TRACE = [name for name, effect in HIDDEN.items() if effect.on_trace]
 class Planted:
     """States and traces of the three runs."""
 
-    states: tuple[State, ...]
+    states: tuple[RigState, ...]
     traces: tuple[Trace, ...]
 
     @property

@@ -18,10 +18,10 @@ from tests.unit.rig.hidden_cases import (
 from tirelib.core.errors import ParameterError
 from tirelib.core.parameters import Tire
 from tirelib.effects import CATALOGUE
+from tirelib.effects.state import Operating
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import predict, values_of
-from tirelib.model.state import Operating
 from tirelib.rig.hidden import HIDDEN, hidden
 from tirelib.rig.mesh import mesh
 from tirelib.rig.observe import Trace, contact, edges, forces

@@ -8,7 +8,7 @@ import pytest
 from tirelib.rig.measure import MeasuringChain, Recording, Stage, gages, record, settle
 from tirelib.rig.mesh import mesh
 from tirelib.rig.observe import Forces, Trace
-from tirelib.rig.solve import State
+from tirelib.rig.solve import RigState
 from tirelib.rig.tire import Condition, RigTire
 
 CONDITION = Condition(4800.0, 2.3e5, 18.0)
@@ -17,10 +17,10 @@ QUIET = MeasuringChain(
 )
 
 
-def made_up() -> tuple[State, Trace, Forces]:
+def made_up() -> tuple[RigState, Trace, Forces]:
     grid = mesh()
     zero = np.zeros((grid.n, 16))
-    state = State(
+    state = RigState(
         RigTire(), CONDITION, grid, zero, 0.292, 0.308, 0.308, zero, stiffness=2e5, steps=0
     )
     phi = np.linspace(-np.pi, np.pi, 7200, endpoint=False)

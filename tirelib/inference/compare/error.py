@@ -20,15 +20,15 @@ from typing import Any
 import numpy as np
 
 from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.effects.state import Operating
 from tirelib.inference.compare.lag import fitted_delay, late_prediction
-from tirelib.inference.compare.model import Model, Prediction, predict_runs
+from tirelib.inference.compare.model import Prediction, TireModel, predict_runs
 from tirelib.inference.compare.set_points import predict_set_points, tangents
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.identify.noise import LEAST_NOISE
 from tirelib.inference.identify.random_effects import Whitening, scales, whitening_of
 from tirelib.measured.signal import LowPass
 from tirelib.model.base import operating_points
-from tirelib.model.state import Operating
 from tirelib.physics.rolling.solve import Start
 
 NOISE, MICROSTRAIN = "noise", "ustrain"
@@ -148,13 +148,13 @@ class Yardstick:
         return NOISE if np.isfinite(self.noise) else MICROSTRAIN
 
     def error(
-        self, model: Model, delay: float | None = None, *, start: Start | None = None
+        self, model: TireModel, delay: float | None = None, *, start: Start | None = None
     ) -> ModelError:
         """Return the error of a model.
 
         Parameters
         ----------
-        model : Model
+        model : TireModel
         delay : float, optional, [s]
             That of the runs to which the model was fitted, where these are others; it is fitted
             here by default.
@@ -198,7 +198,7 @@ class Yardstick:
         )
 
 
-def error_of(runs: StraightRuns, model: Model) -> ModelError:
+def error_of(runs: StraightRuns, model: TireModel) -> ModelError:
     """Return the error of a model on a campaign's straight runs.
 
     Raises

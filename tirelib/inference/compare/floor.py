@@ -8,12 +8,12 @@ import numpy as np
 from scipy import linalg
 
 from tirelib.core.arrays import FloatArray
+from tirelib.effects.state import Operating
 from tirelib.inference.compare.error import ModelError
-from tirelib.inference.compare.model import Model, Prediction
+from tirelib.inference.compare.model import Prediction, TireModel
 from tirelib.inference.identify.discrepancy import Discrepancy
 from tirelib.inference.identify.random_effects import Whitening
 from tirelib.measured.waveforms import GRID
-from tirelib.model.state import Operating
 
 LEAST_ERROR = 1.1
 """Error from which there is a misfit to be shared out."""
@@ -41,12 +41,12 @@ class Floor:
     share: float
 
 
-def floor_of(model: Model, data_hash: str, error: ModelError, points: Operating) -> Floor:
+def floor_of(model: TireModel, data_hash: str, error: ModelError, points: Operating) -> Floor:
     """Return what is known of the floor.
 
     Parameters
     ----------
-    model : Model
+    model : TireModel
     data_hash : str
         Hash of the campaign: a floor on other data is none here.
     error : ModelError

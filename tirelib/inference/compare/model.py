@@ -10,13 +10,13 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError, FormatError, ParameterError, TirelibError
 from tirelib.core.parameters import TireFile
 from tirelib.effects import CATALOGUE, Effect
+from tirelib.effects.state import Operating, State
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import N_PHI
 from tirelib.model.base import predict, values_of
 from tirelib.model.chain import Change, Changes
 from tirelib.model.slopes import slopes_of
 from tirelib.model.solution import solved
-from tirelib.model.state import Operating, State
 from tirelib.physics.rolling.solve import Start
 
 TRIAL = 1e-3
@@ -38,7 +38,7 @@ class UsedEffect:
 
 
 @dataclass(frozen=True, slots=True)
-class Model:
+class TireModel:
     """A tire with its effects.
 
     Attributes
@@ -68,7 +68,7 @@ class Model:
         values: Mapping[str, float | FloatArray],
         effects: Sequence[Effect],
         strengths: Sequence[FloatArray],
-    ) -> "Model":
+    ) -> "TireModel":
         """Return the model of a fit: values of a tire, and effects with arrays of components."""
         used = tuple(
             UsedEffect(
@@ -96,7 +96,7 @@ class Model:
         return any("lateral" in used.effect.varies_with for used in self.used)
 
 
-def model_of(file: TireFile, effects: Mapping[str, Effect] = CATALOGUE) -> Model:
+def model_of(file: TireFile, effects: Mapping[str, Effect] = CATALOGUE) -> TireModel:
     """Return the model of a file; a plain tire file is a model without effects.
 
     Raises
@@ -110,7 +110,7 @@ def model_of(file: TireFile, effects: Mapping[str, Effect] = CATALOGUE) -> Model
         faults.append(f"{file.name}, model.ring = {kind!r}; allowed are {', '.join(RINGS)}")
     if faults:
         raise FormatError(faults)
-    return Model(
+    return TireModel(
         file.name,
         values_of(file.tire),
         used,
@@ -191,7 +191,7 @@ class Prediction:
 
 
 def predict_runs(
-    model: Model,
+    model: TireModel,
     points: Operating,
     lateral: Sequence[float],
     low_pass: LowPass,
@@ -202,7 +202,7 @@ def predict_runs(
 
     Parameters
     ----------
-    model : Model
+    model : TireModel
     points : Operating
     lateral : sequence of float, [m]
         Positions of the gages that are averaged (left positive).
@@ -227,7 +227,7 @@ def predict_runs(
 
 
 def _predict_runs(
-    model: Model,
+    model: TireModel,
     points: Operating,
     lateral: FloatArray,
     low_pass: LowPass,

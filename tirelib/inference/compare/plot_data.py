@@ -21,10 +21,11 @@ from tirelib.core.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.core.parameters import TireFile
 from tirelib.core.quantities import QUANTITIES
 from tirelib.effects import Effect
+from tirelib.effects.state import Operating
 from tirelib.inference.compare.force_curves import set_point_levels
 from tirelib.inference.compare.force_model import force_model_of, usable_points
 from tirelib.inference.compare.forces import ForceComparison
-from tirelib.inference.compare.model import Model
+from tirelib.inference.compare.model import TireModel
 from tirelib.inference.compare.runs import Chosen, choose
 from tirelib.inference.compare.strain import Comparison
 from tirelib.inference.identify.delay import by_delay
@@ -38,7 +39,6 @@ from tirelib.model.base import coordinates, linearised, operating_points, predic
 from tirelib.model.chain import Changes
 from tirelib.model.slopes import by_values
 from tirelib.model.solution import solved
-from tirelib.model.state import Operating
 
 FORMAT = "tirelib-plot-data/1"
 CONDITIONS = ("pressure", "speed", "slip_angle", "camber", "slip_ratio")
@@ -229,7 +229,7 @@ Solved = tuple[FloatArray, FloatArray, Callable[[Changes], FloatArray]]
 """Waveforms, their slopes by the tire's numbers, and what waveforms other effects give."""
 
 
-def _rolling(model: Model, at: Operating, low_pass: LowPass) -> Solved:
+def _rolling(model: TireModel, at: Operating, low_pass: LowPass) -> Solved:
     """Return the rolling ring with the model's effects."""
     free = coordinates(model.values)
     found = solved(model.values, at, model.changes, low_pass=low_pass)
@@ -240,7 +240,7 @@ def _rolling(model: Model, at: Operating, low_pass: LowPass) -> Solved:
     return found.waveform, by_values(found, free).waveform[: len(free)], planted
 
 
-def _linear(model: Model, at: Operating, low_pass: LowPass) -> Solved:
+def _linear(model: TireModel, at: Operating, low_pass: LowPass) -> Solved:
     """Return the linear ring with the model's effects."""
     free = coordinates(model.values)
     found = linearised(model.values, at, free, model.changes, low_pass=low_pass)

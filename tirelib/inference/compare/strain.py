@@ -10,7 +10,7 @@ from tirelib.inference.compare.error import ModelError, Yardstick
 from tirelib.inference.compare.floor import Floor, floor_of
 from tirelib.inference.compare.gages import Gage, compare_gages, gage_sentences
 from tirelib.inference.compare.lag import lag_message, late_prediction
-from tirelib.inference.compare.model import Model, Prediction, predict_runs
+from tirelib.inference.compare.model import Prediction, TireModel, predict_runs
 from tirelib.inference.compare.regions import SLIPS, Region, find_regions
 from tirelib.inference.compare.runs import Chosen, choose
 from tirelib.inference.compare.sectors import Cell, cells, sectors_of
@@ -64,7 +64,7 @@ class Comparison:
     ----------
     chosen : Chosen
         Runs, gages and conditions.
-    model : Model
+    model : TireModel
     error : ModelError
         Over the counted (straight) runs, with the delay.
     prediction : Prediction
@@ -94,7 +94,7 @@ class Comparison:
     """
 
     chosen: Chosen
-    model: Model
+    model: TireModel
     error: ModelError
     prediction: Prediction
     points: SetPoints
@@ -129,13 +129,13 @@ class Comparison:
         return int(order[0]), int(order[(order.size - 1) // 2]), int(order[-1])
 
 
-def compare_strain(waves: Waveforms, model: Model, data_hash: str = "") -> Comparison:
+def compare_strain(waves: Waveforms, model: TireModel, data_hash: str = "") -> Comparison:
     """Hold a model against measured waveforms.
 
     Parameters
     ----------
     waves : Waveforms
-    model : Model
+    model : TireModel
     data_hash : str
         `Campaign.content_hash()`; tells whether the model was identified from these data.
 

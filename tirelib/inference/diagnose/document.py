@@ -8,7 +8,7 @@ import numpy as np
 
 from tirelib.core.errors import TirelibError
 from tirelib.inference.compare.error import NOISE, ModelError, named_errors
-from tirelib.inference.compare.model import Model
+from tirelib.inference.compare.model import TireModel
 from tirelib.inference.diagnose.diagnose import Diagnosis, Finding
 from tirelib.inference.diagnose.fitted import Fitted
 from tirelib.inference.diagnose.floor import floor_of
@@ -28,7 +28,7 @@ class Assessment(Assessed):
 
     Attributes
     ----------
-    given : Model
+    given : TireModel
         The model that was diagnosed, as its file has it.
     before, refitted, after : ModelError
         Errors of the model as it is given, with the numbers of the least error, and with the named
@@ -38,7 +38,7 @@ class Assessment(Assessed):
     """
 
     diagnosis: Diagnosis
-    given: Model
+    given: TireModel
     before: ModelError
     refitted: ModelError
     after: ModelError
@@ -51,13 +51,13 @@ class Assessment(Assessed):
         return self.refitted.value * float(np.sqrt(max(1.0 - finding.share, 0.0)))
 
 
-def assess(found: Diagnosis, given: Model) -> Assessment:
+def assess(found: Diagnosis, given: TireModel) -> Assessment:
     """Return a diagnosis with floor, held-out errors and what is left.
 
     Parameters
     ----------
     found : Diagnosis
-    given : Model
+    given : TireModel
         The model that was diagnosed, as its file has it.
     """
     models = found.models

@@ -15,7 +15,7 @@ from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import TirelibError
 from tirelib.effects import Effect
 from tirelib.inference.compare.error import ModelError, Yardstick
-from tirelib.inference.compare.model import Model
+from tirelib.inference.compare.model import TireModel
 from tirelib.inference.identify.delay import UNIT
 from tirelib.inference.problems.strain import StrainProblem
 from tirelib.inference.statistics.hypothesis import Hypothesis
@@ -66,9 +66,9 @@ class Fitted:
         return self.hypothesis.fit.strengths
 
     @property
-    def model(self) -> Model:
+    def model(self) -> TireModel:
         """The tire with its effects, without the delay: what a model file holds."""
-        return Model.fitted(self.values, self.effects, self.strengths)
+        return TireModel.fitted(self.values, self.effects, self.strengths)
 
     @property
     def error(self) -> float:
@@ -90,7 +90,7 @@ class Fitted:
         """Covariance of the tire's coordinates, the delay, and strengths in ranges, (n, n)."""
         return self.hypothesis.fit.covariance
 
-    def without_runs(self, out: BoolArray) -> tuple[Model, float]:
+    def without_runs(self, out: BoolArray) -> tuple[TireModel, float]:
         """Return the model fitted without some of the runs, and the delay [s] found there.
 
         Smooth misfits of plain tires take part in the fit; other effects do not.
@@ -113,7 +113,7 @@ class Fitted:
             settled=ROUGH,
         )
         values = move(part.values, found.point.base[:-1], part.free)
-        model = Model.fitted(values, found.effects, found.strengths)
+        model = TireModel.fitted(values, found.effects, found.strengths)
         return model, UNIT * float(found.point.base[-1])
 
 
@@ -128,12 +128,14 @@ def fitted(hypotheses: Hypotheses, hypothesis: Hypothesis, yardstick: Yardstick)
     problem, fit = hypotheses.problem, hypothesis.fit
     assert isinstance(problem, StrainProblem)  # noqa: S101 - of strain
     values = move(problem.values, fit.point.base[:-1], problem.free)
-    model = Model.fitted(values, fit.effects, fit.strengths)
+    model = TireModel.fitted(values, fit.effects, fit.strengths)
     reached = yardstick.error(model, start=fit.solved.model.rolling)
     return Fitted(hypotheses, hypothesis, values, reached)
 
 
-def least_error(model: Fitted, given: Model, yardstick: Yardstick) -> tuple[ModelError, ModelError]:
+def least_error(
+    model: Fitted, given: TireModel, yardstick: Yardstick
+) -> tuple[ModelError, ModelError]:
     """Return the error of a model as it is given, and the least one with other numbers.
 
     The likeliest numbers beside what plain tires show are not those of the least error. These are
@@ -142,7 +144,7 @@ def least_error(model: Fitted, given: Model, yardstick: Yardstick) -> tuple[Mode
     Parameters
     ----------
     model : Fitted
-    given : Model
+    given : TireModel
         The same effects, with the numbers of its file.
     yardstick : Yardstick
 
@@ -170,7 +172,7 @@ def least_error(model: Fitted, given: Model, yardstick: Yardstick) -> tuple[Mode
                 settled=LEAST_GAIN * yardstick.strain.size,
             )
             numbers = move(alone.values, found.point.base[:-1], alone.free)
-            least = Model.fitted(numbers, found.effects, found.strengths)
+            least = TireModel.fitted(numbers, found.effects, found.strengths)
             reached = yardstick.error(least, start=found.solved.model.rolling)
             last, best = best, min(best, reached, key=_value)
             if reached.value**2 > (1.0 - LEAST_GAIN) * last.value**2:

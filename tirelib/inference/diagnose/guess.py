@@ -13,11 +13,11 @@ import numpy as np
 from scipy import optimize
 
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.effects.state import Operating
 from tirelib.inference.diagnose.left import Power
 from tirelib.inference.identify.error_bands import levels
 from tirelib.inference.identify.random_effects import angle_slope
 from tirelib.measured.waveforms import GRID
-from tirelib.model.state import Operating
 
 MOST_TERMS = 3
 """Terms of a guessed law at most."""

@@ -7,12 +7,12 @@ import numpy as np
 from scipy import stats
 
 from tirelib.core.arrays import FloatArray
+from tirelib.effects.state import Operating
 from tirelib.inference.compare.error import ModelError
 from tirelib.inference.compare.sectors import SECTORS, sectors_of
 from tirelib.inference.compare.sentences import PLACES
 from tirelib.inference.identify.error_bands import levels
 from tirelib.measured.waveforms import GRID
-from tirelib.model.state import Operating
 
 FLAT = 0.2
 """Power of a condition below which the residual is said not to change with it."""

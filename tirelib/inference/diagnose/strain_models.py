@@ -10,7 +10,7 @@ from tirelib.core.errors import ConvergenceError
 from tirelib.core.forked import forked
 from tirelib.effects import Effect
 from tirelib.inference.compare.error import ModelError, Yardstick
-from tirelib.inference.compare.model import Model
+from tirelib.inference.compare.model import TireModel
 from tirelib.inference.diagnose.fitted import Fitted, fitted, least_error
 from tirelib.inference.diagnose.floor import floor_of
 from tirelib.inference.diagnose.held_out import folds, held_out, values_of_errors
@@ -91,7 +91,9 @@ class StrainModels:
         """Return the fit with one effect more; errors as of `at`."""
         return self.at((*self.hypotheses.added(before.hypothesis), effect.name), before)
 
-    def least_error(self, fit: Fitted, given: Model | None = None) -> tuple[ModelError, ModelError]:
+    def least_error(
+        self, fit: Fitted, given: TireModel | None = None
+    ) -> tuple[ModelError, ModelError]:
         """Return the error of a model as it is given, and the least one with other numbers.
 
         Parameters
@@ -109,7 +111,7 @@ class StrainModels:
         return [self._held[fit] for fit in fits]
 
     def find(
-        self, fit: Fitted | None = None, given: Model | None = None, held: Sequence[Fitted] = ()
+        self, fit: Fitted | None = None, given: TireModel | None = None, held: Sequence[Fitted] = ()
     ) -> None:
         """Find the least error of a model, and errors of models on each fold's runs, all at once.
 

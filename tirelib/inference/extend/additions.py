@@ -15,7 +15,7 @@ from tirelib.core.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.core.parameters import TireFile
 from tirelib.effects import Effect
 from tirelib.inference.compare.force_model import ForceModel, force_model_of
-from tirelib.inference.compare.model import Model, model_of
+from tirelib.inference.compare.model import TireModel, model_of
 from tirelib.inference.diagnose.document import Assessment
 from tirelib.inference.diagnose.forces.assess import ForceAssessment, force_cases
 from tirelib.inference.extend.document import extension_document
@@ -43,7 +43,7 @@ from tirelib.measured.waveforms import measure_waveforms
 
 Progress = Callable[[str], None]
 S = TypeVar("S", bound=Step[Any])
-Known = Model | ForceModel
+Known = TireModel | ForceModel
 Extended = tuple[TireFile, dict[str, Any]]
 """A model after a step, and ``tirelib-extension/1`` of it."""
 

@@ -8,7 +8,7 @@ from tirelib.core.errors import ParameterError
 from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.inference.compare.error import ModelError
-from tirelib.inference.compare.model import Model
+from tirelib.inference.compare.model import TireModel
 from tirelib.inference.diagnose.diagnose import FALSE_ALARM, plain_tires
 from tirelib.inference.diagnose.fitted import Fitted
 from tirelib.inference.diagnose.strain_models import StrainModels
@@ -43,7 +43,7 @@ class Extension(Step[Fitted]):
 
 @one_thread()
 def extended(
-    models: StrainModels, given: Model, effect: Effect, before: Fitted | None = None
+    models: StrainModels, given: TireModel, effect: Effect, before: Fitted | None = None
 ) -> Extension:
     """Return a model with one effect more; values and all strengths are fitted anew.
 
@@ -51,7 +51,7 @@ def extended(
     ----------
     models : StrainModels
         About the model (`strain_models`).
-    given : Model
+    given : TireModel
         As its file has it.
     effect : Effect
     before : Fitted, optional
@@ -71,7 +71,7 @@ def extended(
 @one_thread()
 def remove_effect(
     runs: StraightRuns,
-    model: Model,
+    model: TireModel,
     effect: Effect,
     *,
     progress: Callable[[str], None] | None = None,
@@ -88,7 +88,7 @@ def remove_effect(
     places = kept(model.name, model.of_strain[0], effect, "strain")
     models = strain_models(runs, model, [effect], progress)
     before = models.at()
-    fewer = Model.fitted(
+    fewer = TireModel.fitted(
         before.values,
         [before.effects[k] for k in places],
         [before.strengths[k] for k in places],
@@ -99,7 +99,7 @@ def remove_effect(
 
 def strain_models(
     runs: StraightRuns,
-    model: Model,
+    model: TireModel,
     more: Sequence[Effect],
     progress: Callable[[str], None] | None = None,
 ) -> StrainModels:
@@ -109,7 +109,7 @@ def strain_models(
     return StrainModels(Hypotheses(problem, plain_tires(), FALSE_ALARM, progress), progress)
 
 
-def refuse(model: Model, effect: Effect) -> None:
+def refuse(model: TireModel, effect: Effect) -> None:
     """Raise ParameterError if a model has an effect, or its base fits it, or it is of the brush."""
     if effect.name in in_base(model.values):
         raise ParameterError(
@@ -124,7 +124,7 @@ def refuse(model: Model, effect: Effect) -> None:
 
 
 def _extension(
-    step: Step[Fitted], models: StrainModels, others: StrainModels, given: Model | None
+    step: Step[Fitted], models: StrainModels, others: StrainModels, given: TireModel | None
 ) -> Extension:
     """Return a step with its runs and errors."""
     told, refitted = models.least_error(step.before, given)

@@ -8,6 +8,7 @@ import numpy as np
 from tirelib.campaign import Tolerance
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import CalibrationError
+from tirelib.effects.state import Operating
 from tirelib.inference.identify.noise import RepeatNoise, measured_tangents, repeat_noise
 from tirelib.inference.identify.strain_notes import (
     LEAST_LOAD_RATIO,
@@ -21,7 +22,6 @@ from tirelib.inference.identify.strain_notes import (
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID, Waveforms
 from tirelib.model.base import operating_points
-from tirelib.model.state import Operating
 
 __all__ = [
     "LEAST_RUNS",

@@ -7,8 +7,8 @@ later by an angle that goes with the speed. Left alone it is most of what a good
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.effects.effect import State
 from tirelib.effects.harmonics import orders, with_gain
+from tirelib.effects.state import State
 from tirelib.inference.identify.random_effects import angle_slope
 from tirelib.model.chain import Change
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.model.state import Operating
+from tirelib.effects.state import Operating
 
 REFERENCE_LOAD = 4000.0
 REFERENCE_PRESSURE = 2.0e5

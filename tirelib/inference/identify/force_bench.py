@@ -8,11 +8,12 @@ import numpy as np
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import CalibrationError
 from tirelib.core.parameters import Tire
+from tirelib.effects.brush_state import BrushConditions, BrushState
 from tirelib.inference.identify.brush_law import Reference, point_parameters
 from tirelib.inference.identify.brush_model import BrushModel
 from tirelib.inference.identify.force_points import ForcePoints
 from tirelib.inference.identify.ring_patch import half_lengths, ring_contact
-from tirelib.model.brush import BrushChange, BrushConditions, BrushState, brush_forces, brush_state
+from tirelib.model.brush import BrushChange, brush_forces, brush_state
 from tirelib.physics.brush.predict import PointForces
 from tirelib.physics.brush.shaped import HIGHEST
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.effects.brush_state import BrushConditions
 from tirelib.inference.identify.error_bands import MOST_LEVELS
 from tirelib.inference.identify.force_data import ForceData
-from tirelib.model.brush import BrushConditions
 
 CELL_ANGLE, CELL_RATIO = float(np.deg2rad(0.5)), 0.01
 """Size of a cell in slip angle and camber [rad], and in slip ratio."""

@@ -21,6 +21,7 @@ import numpy as np
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import TirelibError
 from tirelib.core.forked import forked
+from tirelib.effects.state import Operating
 from tirelib.inference.identify.laboratory import Test, laboratory_tests
 from tirelib.inference.identify.random_effects import scales, tangents, whitening_of
 from tirelib.inference.identify.waveform_fit import WaveformFit
@@ -28,7 +29,6 @@ from tirelib.inference.identify.waveform_problem import MISFIT
 from tirelib.inference.statistics.plain import BASE
 from tirelib.model.slopes import SolutionSlopes, slopes_of
 from tirelib.model.solution import Solution, solved
-from tirelib.model.state import Operating
 
 BELOW, ABOVE = 0.8, 1.2
 """How far the envelope of loads, pressures and speeds is extended."""

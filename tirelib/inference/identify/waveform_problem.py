@@ -13,6 +13,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.effects import Effect
+from tirelib.effects.state import Operating
 from tirelib.inference.identify.campaign_data import Data, begins_with
 from tirelib.inference.identify.delay import STD, UNIT, by_delay, earlier
 from tirelib.inference.identify.discrepancy import Discrepancy
@@ -23,7 +24,6 @@ from tirelib.model.base import Coordinate, move
 from tirelib.model.chain import Changes
 from tirelib.model.slopes import SolutionSlopes, slopes_of
 from tirelib.model.solution import Solution, solved
-from tirelib.model.state import Operating
 from tirelib.physics.rolling.assemble import Unknowns
 from tirelib.physics.rolling.solve import Rolling
 

@@ -10,8 +10,8 @@ import numpy as np
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.core.quantities import QUANTITIES, Quantity
+from tirelib.effects.state import Operating
 from tirelib.inference.planning.sweep import Sweep
-from tirelib.model.state import Operating
 
 Range = tuple[float, float]
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tirelib.effects import Effect
-from tirelib.model.brush import BrushConditions
+from tirelib.effects.brush_state import BrushConditions
 
 SPANS = {
     "load": 0.1,

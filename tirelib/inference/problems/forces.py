@@ -13,13 +13,14 @@ import numpy as np
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import TirelibError
 from tirelib.effects import Effect
+from tirelib.effects.brush_state import BrushState
 from tirelib.inference.identify.brush_law import SPECS
 from tirelib.inference.identify.discrepancy import bumps
 from tirelib.inference.identify.force_bench import Changes, ForceBench
 from tirelib.inference.problems.force_plan import SPANS, blind, varies
 from tirelib.inference.problems.whiten_forces import PointWhitener
 from tirelib.inference.statistics.problem import Point
-from tirelib.model.brush import BrushState, brush_forces
+from tirelib.model.brush import brush_forces
 from tirelib.model.brush_slopes import STEP, StateSlopes, moment_of
 
 COORDINATES: Mapping[str, tuple[str, ...]] = {

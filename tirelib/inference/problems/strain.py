@@ -13,6 +13,7 @@ import numpy as np
 
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.effects import Effect
+from tirelib.effects.state import Operating, State
 from tirelib.inference.identify.campaign_data import StraightRuns, begins_with
 from tirelib.inference.identify.delay import STD, UNIT, by_delay, earlier
 from tirelib.inference.identify.literature import literature
@@ -34,7 +35,6 @@ from tirelib.model.base import coordinates, move
 from tirelib.model.chain import Changes
 from tirelib.model.slopes import SolutionSlopes, added_by_values, by_effects, by_values
 from tirelib.model.solution import Solution
-from tirelib.model.state import Operating, State
 from tirelib.physics.rolling.assemble import Unknowns
 from tirelib.physics.rolling.solve import Rolling
 

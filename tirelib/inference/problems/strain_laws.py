@@ -6,6 +6,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.parameters import FIELDS
+from tirelib.effects.state import Operating, State
 from tirelib.inference.identify.discrepancy import (
     REFERENCE_LOAD,
     REFERENCE_OMEGA,
@@ -15,7 +16,6 @@ from tirelib.inference.identify.discrepancy import (
 )
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import Coordinate
-from tirelib.model.state import Operating, State
 
 SHAPES = Discrepancy(inside=1.0, outside=0.15, by_load=1.0, by_pressure=1.0, by_speed=1.0)
 """Smooth shapes over the wheel angle."""

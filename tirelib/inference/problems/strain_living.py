@@ -7,8 +7,8 @@ import numpy as np
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.effects import Effect
+from tirelib.effects.state import Operating
 from tirelib.model.base import coordinates
-from tirelib.model.state import Operating
 
 IN_BASE = {
     "belt_extension": "extension_stiffness",

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
+from tirelib.effects.state import Operating
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
-from tirelib.model.state import Operating
 
 GAIN = 0.1
 """Gain of the low-pass, in power, below which a harmonic holds nothing."""

@@ -17,7 +17,7 @@ PER_DEGREE = MICRO * float(np.pi / 180.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class Curve:
     """A curve of `Simulation`: its field, factor to the plot's unit, and axis label.
 
     A `traction` ends at the edges of the contact, which lie between the angles of the grid.
@@ -29,18 +29,18 @@ class Quantity:
     traction: bool = False
 
 
-PRESSURE = Quantity("pressure", 1e-3, label("contact pressure, inward", "N/mm"), True)
-NORMAL = Quantity("normal", 1e-3, label("normal to the road, on the tire", "N/mm"), True)
-SHEAR = Quantity(
+PRESSURE = Curve("pressure", 1e-3, label("contact pressure, inward", "N/mm"), True)
+NORMAL = Curve("normal", 1e-3, label("normal to the road, on the tire", "N/mm"), True)
+SHEAR = Curve(
     "shear", 1e-3, label("along the road, on the tire,\ntoward the exit > 0", "N/mm"), True
 )
-RADIAL = Quantity("u", 1e3, label("radial displacement u, outward > 0", "mm"))
-TANGENTIAL = Quantity("v", 1e3, label("tangential displacement v,\ntoward the exit > 0", "mm"))
-STRAIN = Quantity("strain", MICRO, label("strain, tension > 0", "microstrain"))
-RATE = Quantity("rate", PER_DEGREE, label("strain rate", "microstrain/deg"))
+RADIAL = Curve("u", 1e3, label("radial displacement u, outward > 0", "mm"))
+TANGENTIAL = Curve("v", 1e3, label("tangential displacement v,\ntoward the exit > 0", "mm"))
+STRAIN = Curve("strain", MICRO, label("strain, tension > 0", "microstrain"))
+RATE = Curve("rate", PER_DEGREE, label("strain rate", "microstrain/deg"))
 
 
-def curve(done: Simulation, quantity: Quantity, point: int) -> tuple[FloatArray, FloatArray]:
+def curve(done: Simulation, quantity: Curve, point: int) -> tuple[FloatArray, FloatArray]:
     """Return angles [rad] and values as drawn; a traction is zero at the contact's edges."""
     phi, values = done.phi, quantity.factor * getattr(done, quantity.field)[point]
     if quantity.traction:
@@ -52,7 +52,7 @@ def curve(done: Simulation, quantity: Quantity, point: int) -> tuple[FloatArray,
 def draw(
     axes: Axes,
     done: Simulation,
-    quantity: Quantity,
+    quantity: Curve,
     labels: Sequence[str],
     colours: Sequence[str],
     *,

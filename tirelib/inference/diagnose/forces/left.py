@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.effects.brush_state import BrushConditions
 from tirelib.inference.diagnose.forces.fit import ForceFit, MeasuredForce
 from tirelib.inference.diagnose.left import FLAT, Power, powers_of
 from tirelib.inference.problems.force_plan import varies
 from tirelib.inference.problems.forces import slip_of
-from tirelib.model.brush import BrushConditions
 
 BANDS = (
     (0.0, 1.0, "where most of the contact sticks"),

@@ -74,6 +74,10 @@ READ = frozenset(
 """Values of a tire that a state reads: the linear ring and its contact know no others."""
 
 
+LATER: Any = None
+"""What a field holds until the chain has come to its stage."""
+
+
 @dataclass(frozen=True, slots=True)
 class State:
     """Operating points with the model's constants there, and what has been computed so far.
@@ -95,8 +99,8 @@ class State:
         d0 that the constants follow; at the contact stage and later, that of the solution.
     start : Start or None
         Solution of a contact nearby; it only saves time.
-    contact : RadialContact or None
-        From the contact stage on.
+    contact : RadialContact
+        From the contact stage on, as the next three; `LATER` before.
     belt : shape (n_points, n_modes + 1, 3)
         Harmonics of u, v [m] and beta [rad], from the contact stage on.
     strain : shape (n_points, n_modes + 1)
@@ -131,10 +135,10 @@ class State:
     deflection: FloatArray
     lateral: float = 0.0
     start: Start | None = None
-    contact: RadialContact | None = None
-    belt: ComplexArray | None = None
-    strain: ComplexArray | None = None
-    waveform: FloatArray | None = None
+    contact: RadialContact = LATER
+    belt: ComplexArray = LATER
+    strain: ComplexArray = LATER
+    waveform: FloatArray = LATER
 
     @classmethod
     def of(
@@ -188,7 +192,7 @@ class State:
         ParameterError
             If it has not.
         """
-        if self.waveform is None:
+        if self.waveform is LATER:
             raise ParameterError(
                 "state: it holds no waveform yet; solve it with `tirelib.model.chain.waveform`"
             )
