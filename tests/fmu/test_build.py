@@ -21,6 +21,7 @@ from tirelib.core.flags import TurnFlag
 from tirelib.core.units import TABLE
 from tirelib.fmu.build import build_fmu, embedded_calibration
 from tirelib.fmu.bundle import collect, content_hash, renamed
+from tirelib.fmu.native import core_file
 from tirelib.fmu.parts import source_file
 from tirelib.fmu.run import LoadedFmu
 from tirelib.stream.estimator import RATES
@@ -323,3 +324,11 @@ def test_bad_files_are_refused(tmp_path: Path) -> None:
     (tmp_path / "no.fmu").write_text("nothing")
     with pytest.raises(FormatError, match="is not an FMU made by"):
         embedded_calibration(tmp_path / "no.fmu")
+    with zipfile.ZipFile(tmp_path / "virtual.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", "<a/>")
+    with pytest.raises(FormatError, match="because it holds no calibration; a strain tire"):
+        embedded_calibration(tmp_path / "virtual.fmu")
+    table = live.folder() / "cal.table"
+    table.write_bytes(core_file(live.calibration()))
+    with pytest.raises(FormatError, match="not the table of `tirelib fmu table`"):
+        build_fmu(table, tmp_path / "x.fmu")

@@ -32,11 +32,15 @@ WANTED = {
     "friction": [r"friction_implausible: friction \[1\] = 3; allowed are 0.05 .. 1.8; .*"],
     "tread depth": [r"tread_depth_implausible: tread_depth \[m\] = 8; allowed are .*"],
     "tread temperature": [r"tread_temperature_implausible: .* = 20; allowed are 230 .. 400; .*"],
-    "pressure": [r"pressure_out_of_range: pressure \[Pa\] = 2.3; .* for 114957 .. 287561; .*"],
+    "pressure": [
+        r"pressure_out_of_range: gauge pressure \[Pa\] = 2.3; .* for 114957 .. 287561; .*"
+    ],
     "two conditions": [r"friction_implausible: .*", r"pressure_out_of_range: .*"],
     "speed": [r"speed_out_of_range: speed \[m/s\] = 65; .* for 2.5 .. 60; .*"],
     "camber": [r"camber_out_of_range: camber \[rad\] = 2; .*"],
-    "turn rate": [r"omega_mismatch: omega \[rad/s\] = 600; by the contacts it is 39.* .. 88.*"],
+    "turn rate": [
+        r"omega_mismatch: omega \[rad/s\] = 600; by the contacts .* 39.* .. 88.* sample_rate"
+    ],
     "load": [r"Fz_out_of_range: Fz \[N\] = 901\S+; calibrated are 297\S+ .. 502\S+; .*"],
     "side force": [r"Fy_out_of_range: Fy \[N\] = -?7\S+; calibrated are -3\S+ .. 3\S+; .*"],
     "strain in microstrain": [r"strain_implausible: strain \[1\] = -?\d+\S*; allowed are -1 .*"],

@@ -26,6 +26,7 @@ from tirelib.estimators.costs import costs_of
 from tirelib.estimators.result import estimate_document
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.check import check_fmu
+from tirelib.fmu.held import not_varied
 from tirelib.fmu.native import core_file
 from tirelib.fmu.parts import DEFAULT_RATE
 from tirelib.fmu.run import LoadedFmu, play_campaign
@@ -185,10 +186,15 @@ def build(
             progress=progress,
         )
     loaded = read_calibration(calibration)
-    gages = ", ".join(f"{1e3 * y:+g}" for y in loaded.lateral)
+    first, last = (
+        f"strain_{number} = {1e3 * y:+g} mm ({'left' if y > 0.0 else 'right'})"
+        for number, y in ((1, loaded.lateral[0]), (len(loaded.lateral), loaded.lateral[-1]))
+    )
     step = 1e3 * samples_per_step / sample_rate
     console = output()
-    console.print(f"tire {loaded.tire}, gages at {gages} mm (ISO 8855)")
+    console.print(f"tire {loaded.tire}, {first} .. {last} (ISO 8855)")
+    for condition in not_varied(loaded):
+        console.print(f"not varied in the calibration: {condition}")
     free = f"of any length, up to {samples_per_step} samples"
     console.print(f"communication step {free if buffered else f'{step:g} ms'}")
     console.print(f"written: {path} ({path.stat().st_size / 1e3:.0f} kB)")

@@ -100,7 +100,12 @@ def read_calibration(path: str | Path) -> Calibration:
         raise FormatError(
             f"{where}: cannot be read ({error.strerror}); give a file made by `tirelib calibrate`"
         ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError:
+        raise FormatError(
+            f"{where}: is not TOML (it is no text); give a file made by `tirelib calibrate`, not "
+            "the table of `tirelib fmu table`"
+        ) from None
+    except tomllib.TOMLDecodeError as error:
         raise FormatError(
             f"{where}: is not TOML ({error}); give a file made by `tirelib calibrate`"
         ) from None

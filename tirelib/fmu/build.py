@@ -109,7 +109,12 @@ def embedded_calibration(fmu: str | Path) -> Calibration:
         raise FormatError(
             f"{fmu}: cannot be read ({error.strerror}); an FMU is needed; check the path"
         ) from None
-    except (KeyError, ValueError, zipfile.BadZipFile) as error:
+    except KeyError:
+        raise FormatError(
+            f"{fmu}: is not an FMU made by `tirelib fmu build`, because it holds no calibration; a "
+            "strain tire is needed; step a virtual tire in any importer"
+        ) from None
+    except (ValueError, zipfile.BadZipFile) as error:
         raise FormatError(
             f"{fmu}: is not an FMU made by `tirelib fmu build` ({error}); build it again"
         ) from None

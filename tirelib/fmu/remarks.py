@@ -28,11 +28,11 @@ TEXTS: Mapping[str, str] = {
     "friction_implausible": f"friction [1] {_CAN_BE} shares of the load, or leave it NaN",
     "tread_depth_implausible": f"tread_depth [m] {_CAN_BE} metres, or leave it NaN",
     "tread_temperature_implausible": f"tread_temperature [K] {_CAN_BE} kelvin, or leave it NaN",
-    "pressure_out_of_range": f"pressure [Pa] {_HOLDS} pascal, or calibrate there",
+    "pressure_out_of_range": f"gauge pressure [Pa] {_HOLDS} pascal, or calibrate there",
     "speed_out_of_range": f"speed [m/s] {_HOLDS} metres per second, or calibrate there",
     "camber_out_of_range": f"camber [rad] {_HOLDS} radians, or calibrate there",
     "omega_mismatch": "omega [rad/s] = {value}; by the contacts it is {low} .. {high}; nothing is "
-    "valid: give radians per second, positive forward, or leave it NaN",
+    "valid: give rad/s, positive forward, or NaN; or check sample_rate",
     "Fz_out_of_range": f"Fz [N] {_RANGE} the unit of the strain",
     "alpha_out_of_range": f"alpha [rad] {_RANGE} the order of the gages",
     "kappa_out_of_range": f"kappa [1] {_RANGE} the unit of the speed",

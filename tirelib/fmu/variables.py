@@ -15,10 +15,12 @@ LIMITS = {"Fz": (-1e5, 1e5), "alpha": (-RIGHT, RIGHT), "kappa": (None, None), "F
 UNITS = {"Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
 DISPLAY = {"Fz": None, "alpha": "deg", "kappa": "%", "Fy": None}
 MEANING = {
-    "Fz": "vertical load",
-    "alpha": "slip angle",
-    "kappa": "slip ratio",
-    "Fy": "lateral force",
+    "Fz": "vertical load, positive in iso and adapted_sae",
+    "alpha": "slip angle, positive in iso and adapted_sae where the wheel moves to the left of "
+    "where it points",
+    "kappa": "slip ratio (omega R_e - speed) / speed, negative when braking",
+    "Fy": "lateral force of the road on the tire, positive to the left in iso and to the right in "
+    "sae and adapted_sae",
 }
 
 
@@ -97,7 +99,8 @@ def parameters(
             "axes",
             "String",
             "parameter",
-            "axis system of outputs and gage order: iso, sae or adapted_sae",
+            "axis system of the outputs and of the order of the gages: iso, sae or adapted_sae; "
+            "speed, omega and camber have the same signs in all three",
             "iso",
         ),
         Variable(
@@ -157,7 +160,7 @@ def inputs(
             "speed",
             "Real",
             "input",
-            "travel speed; NaN: unknown",
+            "travel speed, positive forward; NaN: unknown",
             NAN,
             "m/s",
             "km/h",
@@ -183,8 +186,9 @@ def inputs(
             "camber",
             "Real",
             "input",
-            "camber angle; NaN: unknown, which makes Fy_std and alpha_std large if the "
-            "calibration has one camber only (camber_unknown in status)",
+            "camber angle, positive with the top of the wheel to the right; NaN: unknown, which "
+            "makes Fy_std and alpha_std large if the calibration has one camber only "
+            "(camber_unknown)",
             NAN,
             "rad",
             "deg",
@@ -197,8 +201,8 @@ def inputs(
             "omega",
             "Real",
             "input",
-            "measured turn rate, whose change within the turn corrects the wheel angle; zero: "
-            "standing; NaN: unknown",
+            "measured turn rate, positive forward, whose change within the turn corrects the wheel "
+            "angle; zero: standing; NaN: unknown",
             NAN,
             "rad/s",
             "rpm",

@@ -167,8 +167,24 @@ def inputs(surface: Surface) -> list[Variable]:
     }
     rows = {
         "Fz": ("vertical load", "N", "kN", 1e3, -1e5, 1e5, "Force"),
-        "alpha": ("slip angle, ISO 8855", "rad", "deg", 0.1, -RIGHT, RIGHT, "Angle"),
-        "kappa": ("slip ratio, (omega R_e - speed) / speed", "1", "%", 0.1, None, None, "Ratio"),
+        "alpha": (
+            "slip angle, ISO 8855: positive where the wheel moves to the left",
+            "rad",
+            "deg",
+            0.1,
+            -RIGHT,
+            RIGHT,
+            "Angle",
+        ),
+        "kappa": (
+            "slip ratio (omega R_e - speed) / speed, negative when braking",
+            "1",
+            "%",
+            0.1,
+            None,
+            None,
+            "Ratio",
+        ),
         "camber": (
             "camber angle, top to the right positive",
             "rad",
@@ -178,7 +194,7 @@ def inputs(surface: Surface) -> list[Variable]:
             RIGHT,
             "Angle",
         ),
-        "speed": ("travel speed", "m/s", "km/h", 10.0, -150.0, 150.0, "Speed"),
+        "speed": ("travel speed, forward", "m/s", "km/h", 10.0, -150.0, 150.0, "Speed"),
         "pressure": ("inflation pressure (gauge)", "Pa", "bar", 1e5, 0.0, 2e6, "Pressure"),
         "friction": (
             "coefficient of friction of tread and road",
@@ -231,14 +247,17 @@ def outputs(surface: Surface, samples: int) -> list[Variable]:
                     type="Strain",
                 )
             )
-    force = {"Fx_rig": "force of the road along x", "Fy_rig": "force of the road along y"}
+    force = {
+        "Fx_rig": "force of the road along x, forward positive",
+        "Fy_rig": "force of the road along y, left positive",
+    }
     return [
         *table,
         Variable(
             "omega",
             "Real",
             "output",
-            "turn rate of the wheel",
+            "turn rate of the wheel, positive forward",
             0.0,
             "rad/s",
             "rpm",
