@@ -1,4 +1,4 @@
-/* Wheel angle over time within a turn. Reference: tirelib.signal.angle. */
+/* Wheel angle over time within a turn. Reference: tirelib.measured.signal.angle. */
 #ifndef TIRE_ANGLE_H
 #define TIRE_ANGLE_H
 

@@ -18,14 +18,14 @@
 #endif
 
 enum { GAGES = 16 }; /* most gages of a wheel */
-enum { ANGLES = 361 }; /* wheel angles of a turn: tirelib.signal.turn.PHI */
+enum { ANGLES = 361 }; /* wheel angles of a turn: tirelib.measured.signal.turn.PHI */
 
 static const double PI = 3.14159265358979323846;
 
-/* Conditions that hold while samples are taken, in the order of tirelib.held.HELD. */
+/* Conditions that hold while samples are taken, in the order of tirelib.core.held.HELD. */
 enum { SPEED, PRESSURE, CAMBER, OMEGA, FRICTION, TREAD_DEPTH, TREAD_TEMPERATURE, HELD };
 
-/* tirelib.flags.TurnFlag, same numbers. */
+/* tirelib.core.flags.TurnFlag, same numbers. */
 enum {
     FIRST_TURN = 1,
     GAP = 2,
@@ -51,7 +51,7 @@ enum {
     OMEGA_MISMATCH = 2097152
 };
 
-/* One wheel angle of a turn, [rad], as numpy.linspace rounds it: tirelib.signal.turn.PHI. */
+/* One wheel angle of a turn, [rad], as numpy.linspace rounds it: tirelib.measured.signal.turn.PHI. */
 static inline double phi_at(int index) {
     return index < ANGLES - 1 ? index * ((0.8 - -1.0) / (ANGLES - 1)) + -1.0 : 0.8;
 }

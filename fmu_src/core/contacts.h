@@ -1,7 +1,7 @@
 /* The passages of the centre gage through the contact, found sample by sample.
  *
- * Reference: tirelib.signal.contacts. That code takes whole frames at once; taken one sample at a
- * time it says the same.
+ * Reference: tirelib.measured.signal.contacts. That code takes whole frames at once; taken one
+ * sample at a time it says the same.
  */
 #ifndef TIRE_CONTACTS_H
 #define TIRE_CONTACTS_H

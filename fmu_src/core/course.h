@@ -1,4 +1,4 @@
-/* How a held condition runs over one turn. Reference: tirelib.signal.course. */
+/* How a held condition runs over one turn. Reference: tirelib.measured.signal.course. */
 #ifndef TIRE_COURSE_H
 #define TIRE_COURSE_H
 

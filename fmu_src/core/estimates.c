@@ -9,7 +9,7 @@
 #include "regressors.h"
 #include "unknowns.h"
 
-/* Flags with which no estimate is valid: tirelib.flags.INVALIDATING. */
+/* Flags with which no estimate is valid: tirelib.core.flags.INVALIDATING. */
 enum {
     INVALIDATING = FIRST_TURN | PERIOD_JUMP | ACCELERATING | TRIGGER_MISMATCH | REVERSED |
                    OUT_OF_RANGE | CUT_OFF | TOO_FEW_GAGES | NO_CONDITION | NO_CONTACT | FAULT |

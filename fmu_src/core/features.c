@@ -19,7 +19,7 @@ static int first_from(double low) {
 }
 
 /* Largest of sign * y where the wheel angle is from `low` to `high`, refined by a parabola.
- * Reference: tirelib.features.peaks.peak */
+ * Reference: tirelib.measured.features.peaks.peak */
 static Peak peak(const double *y, double sign, double low, double high) {
     Peak found = {NAN, NAN, 0};
     double start = phi_at(0), spacing = phi_at(1) - phi_at(0), highest = -INFINITY;

@@ -1,4 +1,4 @@
-/* Features of a turn, in the angle domain. Reference: tirelib.features.extract. */
+/* Features of a turn, in the angle domain. Reference: tirelib.measured.features.extract. */
 #ifndef TIRE_FEATURES_H
 #define TIRE_FEATURES_H
 

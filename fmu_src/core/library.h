@@ -2,7 +2,7 @@
  *
  * These are the only functions of the core that a compiled FMU shows to others; their names begin
  * with tirelib_, so that they meet no other library's. Sizes come first, so that the caller gives
- * all memory: aligned as malloc's is, and kept by it. Caller: tirelib.core.
+ * all memory: aligned as malloc's is, and kept by it. Caller: tirelib.core.compiled.
  */
 #ifndef TIRE_LIBRARY_H
 #define TIRE_LIBRARY_H

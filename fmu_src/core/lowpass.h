@@ -1,5 +1,5 @@
 /* Low-pass without phase shift, and the way from time to wheel angle. Reference:
- * tirelib.signal.lowpass. */
+ * tirelib.measured.signal.lowpass. */
 #ifndef TIRE_LOWPASS_H
 #define TIRE_LOWPASS_H
 

@@ -1,4 +1,4 @@
-/* What is wrong with a window of samples. Reference: tirelib.signal.quality. */
+/* What is wrong with a window of samples. Reference: tirelib.measured.signal.quality. */
 #ifndef TIRE_QUALITY_H
 #define TIRE_QUALITY_H
 

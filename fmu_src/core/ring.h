@@ -1,7 +1,7 @@
 /* The samples that turns to come may need: a ring, one row a sample.
  *
- * A row holds the gages, then the held conditions, then the trigger (tirelib.signal.turns.TurnCutter
- * keeps them in its buffer). Beside it stands what the contact finder sees in the centre gage. Of a
+ * A row holds the gages, then the held conditions, then the trigger
+ * (tirelib.measured.signal.turns.TurnCutter keeps them in its buffer). Beside it stands what the contact finder sees in the centre gage. Of a
  * whole record no sample is copied: it is read where the caller has it.
  */
 #ifndef TIRE_RING_H

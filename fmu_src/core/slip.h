@@ -1,4 +1,4 @@
-/* Possible change of the slip ratio within a turn. Reference: tirelib.signal.slip. */
+/* Possible change of the slip ratio within a turn. Reference: tirelib.measured.signal.slip. */
 #ifndef TIRE_SLIP_H
 #define TIRE_SLIP_H
 

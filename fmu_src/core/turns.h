@@ -1,5 +1,5 @@
 /* A stream of samples cut into turns, each ending with its contact. Reference:
- * tirelib.signal.turns.TurnCutter, tirelib.signal.turn.Turn. */
+ * tirelib.measured.signal.turns.TurnCutter, tirelib.measured.signal.turn.Turn. */
 #ifndef TIRE_TURNS_H
 #define TIRE_TURNS_H
 
@@ -29,7 +29,7 @@ typedef struct {
     double time[GAGES], value[GAGES];
 } Opposite;
 
-static const double LARGEST_OMEGA_RATIO = 1.5; /* of tirelib.signal.turns */
+static const double LARGEST_OMEGA_RATIO = 1.5; /* of tirelib.measured.signal.turns */
 
 /* Where the work on the first waiting contact stands. */
 enum { UNSEEN, WAITS_FOR_LAW, WAITS_FOR_END };

@@ -7,7 +7,7 @@
 static const double WATCHDOG_TURNS = 2.0, STANDSTILL = 0.05, LONGEST_TURN = 3.0;
 static const double LOWEST_RATE = 100.0, HIGHEST_RATE = 1e5, STEP_TOLERANCE = 0.01;
 
-/* tirelib.axes.sign of Fz, alpha, kappa, Fy, and of the lateral position. */
+/* tirelib.core.axes.sign of Fz, alpha, kappa, Fy, and of the lateral position. */
 static const double SIGN[3][QUANTITIES + 1] = {
     {1.0, 1.0, 1.0, 1.0, 1.0}, {-1.0, -1.0, 1.0, -1.0, -1.0}, {1.0, 1.0, 1.0, -1.0, -1.0}};
 
