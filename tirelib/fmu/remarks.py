@@ -123,9 +123,9 @@ def _ends(guard: Range) -> tuple[float, float]:
     return guard.low - guard.slack, guard.high + guard.slack
 
 
-def _given(known: Calibration, turn: TurnEstimate, notes: set[str]) -> Iterator[tuple[str, Remark]]:
-    """Yield the conditions that cannot be, or that the calibration does not hold for."""
-    full, features = known.chains[-1], turn.features
+def condition_ends(known: Calibration) -> dict[str, tuple[float, float]]:
+    """Return by kind the ends of each condition beyond which nothing is valid, SI."""
+    full = known.chains[-1]
     laws = (full.laws, full.force_laws) if full.has("Fy") else (full.laws,)
     ends = {f"{name}_implausible": full.road.ends[name] for name in PLAUSIBLE}
     for name in ("pressure", "speed"):
@@ -134,7 +134,13 @@ def _given(known: Calibration, turn: TurnEstimate, notes: set[str]) -> Iterator[
     for guard in full.guards["Fy"]:
         if guard.name == "camber":
             ends["camber_out_of_range"] = _ends(guard)
-    for kind, (low, high) in ends.items():
+    return ends
+
+
+def _given(known: Calibration, turn: TurnEstimate, notes: set[str]) -> Iterator[tuple[str, Remark]]:
+    """Yield the conditions that cannot be, or that the calibration does not hold for."""
+    features = turn.features
+    for kind, (low, high) in condition_ends(known).items():
         if kind in notes:
             name = kind.removesuffix("_implausible").removesuffix("_out_of_range")
             yield kind, Remark(float(getattr(features, name)[0]), low, high)

@@ -33,6 +33,7 @@ from tirebench.cli.run_inputs import (
     refuse_line_options,
     say_missing,
 )
+from tirebench.cli.start_checks import check_conditions, say_slow
 from tirebench.cli.stop import start_in_order
 from tirebench.estimator.chain import Estimator
 from tirebench.estimator.estimation import Estimation, News
@@ -256,7 +257,10 @@ def run(
         calibration = file.calibration
         if calibration is not None:
             known.check_layout(calibration.lateral, str(fmu_file))
+            if conditions is not None:
+                check_conditions(conditions, calibration)
             say_missing(known, calibration, console)
+            say_slow(known, calibration, console)
         bridges = stack.enter_context(Bridges(estimates_out, plotjuggler, plan))
         shown = Shown(choice, console, rules)
         switch: RecordingSwitch | None = None

@@ -25,6 +25,7 @@ from fmpy.fmi2 import (
 from tirebench.errors import FmuError
 from tirebench.estimator.chain import Outputs
 from tirebench.estimator.fmu_archive import FmuArchive
+from tirebench.estimator.remark_units import in_options_units
 from tirebench.wire.conditions import Condition
 from tirebench.wire.frames import GAGES, MOST_GAGES
 from tirelib.core.arrays import FloatArray
@@ -330,7 +331,7 @@ class FmuModel:
     def take_messages(self) -> list[str]:
         """Return what the FMU has logged since the last call: errors that did not end it."""
         said, self._messages[:] = list(self._messages), []
-        return said
+        return [in_options_units(text) for text in said]
 
     def _log(
         self, _component: int, _instance: bytes, _status: int, _category: bytes, message: bytes
