@@ -11,7 +11,7 @@ import click
 from tirebench.cli.stop import on_stop
 from tirebench.deadline import Deadline
 from tirebench.emulator.emulator import Player, Script, Tally, Tape, play, record_tape
-from tirebench.emulator.faults import Faults, parse_faults
+from tirebench.emulator.faults import TEXT_FAULTS, Faults, parse_faults
 from tirebench.emulator.sinks import BusSink, TerminalSink, open_bus
 from tirebench.errors import UnpluggedError
 from tirebench.protocols import CAN, SERIAL, SLCAN
@@ -25,7 +25,10 @@ DRAIN = 600.0
 """At the end, the reader gets this long to take what was sent, [s]."""
 LINGER = 10.0
 """After that, the reader gets this long to close the port, [s]."""
-PLAYED = "played: the reader has taken all of it"
+VIRTUAL = (
+    "warning: the interface virtual connects buses within one program; no other program hears "
+    "them; use can:udp_multicast:239.74.163.2, or can:socketcan:vcan0"
+)
 LOOK = 0.02
 """Time between two looks for a file that is waited for, [s]."""
 AHEAD = 60.0
@@ -214,11 +217,19 @@ def emulate(
         raise click.UsageError(
             "--replug needs --unplug, and --link for a path that does not change"
         )
+    if bus is not None and bus.startswith("can:virtual:"):
+        click.echo(VIRTUAL, err=True)
     if bus is not None and kind == "serial" and recording is None:
         raise click.UsageError("--bus carries CAN frames only: add --format RAW16, RAW12 or RAW12C")
     if len(set(wheels)) != len(wheels) or len(wheels) > 4:
         raise click.UsageError("--wheel: give one to four different numbers")
-    faults = Faults(parse_faults(fault_texts), seed)
+    rates = parse_faults(fault_texts)
+    if bus is not None and (unseen := [name for name in TEXT_FAULTS if name in rates]):
+        raise click.UsageError(
+            f"--fault {unseen[0]} with --bus: a bus has a checksum of its own and shows no damaged "
+            "frame; leave it out, or send on a port (without --bus)"
+        )
+    faults = Faults(rates, seed)
     device = Device() if device_file is None else read_device(device_file)
     tape: Tape | None = None
     runs: list[int] = []
@@ -261,7 +272,7 @@ def emulate(
                     if tape is None:
                         start += shift / speedup
                 if sink.drain(DRAIN):
-                    click.echo(PLAYED)
+                    click.echo(sink.played)
                 sink.end(LINGER)
         except (KeyboardInterrupt, UnpluggedError) as error:
             click.echo(str(error) or "stopped", err=True)

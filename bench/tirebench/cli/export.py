@@ -105,6 +105,13 @@ def export(
     with closing(Recording(recording)) as opened:
         header = opened.header
         sources = recorded_sources(header, str(recording), devices_of(device_texts)[0])
+        if wheel is not None and suffix not in CAN_LOGS:
+            heard = sorted({one.wheel for one in segments(opened, sources, None, _quiet)})
+            if wheel not in heard:
+                raise RecordingError(
+                    f"{recording}: wheel {wheel} is not in it; its wheels are "
+                    f"{', '.join(map(str, heard)) or 'none'}; choose one of them with --wheel"
+                )
         with whole(out) as new:
             if suffix in CAN_LOGS:
                 count, what = write_can_log(opened, new), "frames"
@@ -141,6 +148,10 @@ def export(
             {"format": "tirebench-export/1", "out": str(out), what: count, "complete": not damage},
         )
     context.exit(0 if count and not damage else 1)
+
+
+def _quiet(_: str) -> None:
+    """Say nothing: what is decoded to find its wheels is decoded again."""
 
 
 def _note(said: str) -> None:

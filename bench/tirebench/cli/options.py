@@ -16,9 +16,10 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 WHEEL_MARK = "# wheel "
 PORTS = """\b
-Ports: /dev/ttyUSB0 or COM3, tcp://HOST:PORT, udp://[HOST]:PORT, rfc2217://HOST:PORT (SERIAL v1, or
-the layout that --map describes), slcan:/dev/ttyACM0 (CAN adapter with slcan, read in bulk),
-can:INTERFACE:CHANNEL (python-can: can:socketcan:can0, can:virtual:test, can:pcan:PCAN_USBBUS1).
+Ports: /dev/ttyUSB0 or COM3, tcp:// or socket://HOST:PORT, udp://[HOST]:PORT, rfc2217://HOST:PORT
+(SERIAL v1, or the layout that --map describes), slcan:/dev/ttyACM0 (CAN adapter with slcan, read
+in bulk), can:INTERFACE:CHANNEL (python-can: can:socketcan:can0, can:pcan:PCAN_USBBUS1, and between
+two programs without hardware can:udp_multicast:239.74.163.2).
 """
 
 _PORT_OPTIONS = (
@@ -100,7 +101,8 @@ silence_option = click.option(
     "--silence",
     metavar="S",
     type=click.FloatRange(min=0.0),
-    help="End when nothing came for this time.",
+    help="End when nothing came for this time, counted from the first byte; before it, only "
+    "--duration and Ctrl-C end.",
 )
 """An end by silence."""
 

@@ -15,7 +15,7 @@ from tirebench.cli.options import (
     sidecar_option,
     silence_option,
 )
-from tirebench.cli.recording import at_start, recording_options
+from tirebench.cli.recording import at_start, check_ending, recording_options
 from tirebench.cli.run_inputs import given_live, live_sources
 from tirebench.cli.stop import start_in_order
 from tirebench.estimator.estimation import News
@@ -103,6 +103,7 @@ def record(
     """Record the raw bytes of a port; Ctrl-C ends in good order."""
     if bool(ports) == (setup is not None):
         raise click.UsageError("give exactly one of --port and --setup")
+    check_ending("--out", out)
     keep_recordings(json_file, out)
     devices, text = devices_of(device_texts)
     plan = PortPlan("", baud, bitrate, data_bitrate, bus_options)

@@ -23,6 +23,9 @@ build/bench_trigger.py, rounded up. With `--no-strain` it is less."""
 LITTLE_ROOM = 1e9
 """Room below which there is a warning, [bytes]: about an hour of one wheel."""
 
+OTHER_FORMATS = (".mf4", ".mdf", ".csv", ".parquet", ".blf", ".asc", ".log", ".json")
+"""Endings of files that are no recordings."""
+
 _OPTIONS = (
     click.option(
         "--split-minutes",
@@ -73,6 +76,21 @@ def recording_options(command: Command) -> Command:
     for option in reversed(_OPTIONS):
         decorated = option(decorated)
     return cast(Command, decorated)
+
+
+def check_ending(option: str, path: Path) -> None:
+    """Refuse a name that promises another format than that of a recording.
+
+    Raises
+    ------
+    click.UsageError
+        Which says how to get that format.
+    """
+    if path.suffix.lower() in OTHER_FORMATS:
+        raise click.UsageError(
+            f"{option} {path}: a recording is MCAP; name it {path.with_suffix('.mcap')}, and write "
+            f"{path.suffix} from it with `tirebench export`"
+        )
 
 
 def at_start(path: Path, reader: ReaderPlan, rule: RecordingRule, *, watched: bool) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from tirebench.errors import RecordingError
-from tirebench.recording.journal import HEAD, completed
+from tirebench.recording.journal import HEAD, completed, whole_document
 from tirebench.recording.new_file import whole
 from tirebench.recording.repair import repair as repaired
 from tirelib.cli.common import FILE, NEW_FILE, plain
@@ -33,7 +33,8 @@ def repair(file: Path, out: Path) -> None:
     if out.exists():
         raise RecordingError(f"{out}: already exists; repair never overwrites; name another file")
     if _is_json(file):
-        document = completed(file.read_text(encoding="utf-8", errors="replace"))
+        document = completed(text := file.read_text(encoding="utf-8", errors="replace"))
+        document = document or whole_document(text)
         if document is None:
             raise RecordingError(
                 f"{file}: it holds no turns; a file that `tirebench run --json` "
@@ -52,7 +53,7 @@ def repair(file: Path, out: Path) -> None:
 def _is_json(file: Path) -> bool:
     try:
         with file.open("rb") as opened:
-            return opened.read(len(HEAD)) == HEAD.encode()
+            return opened.read(len(HEAD)).lstrip()[:1] == b"{"
     except OSError as error:
         raise RecordingError(
             f"{file}: it cannot be read ({error.strerror}); a recording or JSON of `tirebench run` "

@@ -22,7 +22,7 @@ from tirebench.cli.options import (
     trust_option,
 )
 from tirebench.cli.page import Shown, page_choice, page_options
-from tirebench.cli.recording import at_start, recording_options
+from tirebench.cli.recording import at_start, check_ending, recording_options
 from tirebench.cli.run_inputs import (
     RunInputs,
     conditions_of,
@@ -223,6 +223,10 @@ def run(
         )
     if replay is not None:
         refuse_line_options(context)
+    if record is None and rule.around is not None:
+        raise click.UsageError("--trigger needs --record FILE.mcap, which it writes to")
+    if record is not None:
+        check_ending("--record", record)
     keep_recordings(json_file, record, replay)
     priority = realtime(asked) if replay is None else ""
     paced = replay is None or pace is not None
@@ -248,7 +252,9 @@ def run(
             sources = live_sources(ports, setup, map_file, usual)
             known = given_live(sources, conditions, numbers)
         else:
-            known = given_replayed(link, conditions, devices, numbers, console)
+            known = given_replayed(
+                link, conditions, devices, numbers, console, single=sidecar is None
+            )
             recorded_with = link.recording.header.fmu
             if recorded_with and recorded_with != archive.sha256:
                 console.print(

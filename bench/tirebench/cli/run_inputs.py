@@ -253,18 +253,26 @@ def given_replayed(
     devices: Mapping[int | None, Device],
     wheels: tuple[int, ...],
     console: Console,
+    *,
+    single: bool = False,
 ) -> RunInputs:
-    """Return what a recording states; given options replace it, with a note."""
-    header = link.recording.header
-    if devices or conditions is not None:
+    """Return what a recording states; given options replace what they name, with a note."""
+    header, recorded = link.recording.header, link.recording.conditions
+    replaced = ["the device file"] if devices else []
+    if conditions is not None and single:
+        replaced += conditions.known
+        conditions = conditions.over(recorded)
+    elif conditions is not None:
+        replaced.append("all conditions")
+    if replaced:
         console.print(
-            "note: options on the command line replace the device file or the "
-            "conditions of the recording"
+            f"note: options on the command line replace {', '.join(replaced)} of the recording",
+            soft_wrap=True,
         )
     sources = recorded_sources(header, link.name, devices)
     if not wheels:
         wheels = tuple(header.settings.get("wheels") or ())
-    return RunInputs(sources, conditions or link.recording.conditions, wheels)
+    return RunInputs(sources, conditions or recorded, wheels)
 
 
 def missing(given: RunInputs, calibration: Calibration) -> tuple[dict[str, str], dict[str, str]]:

@@ -34,6 +34,8 @@ class TerminalSink:
         How often the cable was pulled.
     """
 
+    played = "played: the reader has taken all of it"
+
     def __init__(
         self, link: Path | None = None, unplug: float | None = None, replug: float | None = None
     ) -> None:
@@ -102,6 +104,8 @@ class BusSink:
         For messages.
     """
 
+    played = "played: all of it was put on the bus, which does not show who reads"
+
     def __init__(self, bus: "can.BusABC", path: str) -> None:
         self.path = path
         self._bus = bus
@@ -157,8 +161,8 @@ def open_bus(text: str, *, fd: bool) -> BusSink:
     interface, _, channel = rest.partition(":")
     if kind != "can" or not interface or not channel:
         raise LinkError(
-            f"--bus {text}: can:INTERFACE:CHANNEL is needed, such as can:virtual:test or "
-            "can:socketcan:vcan0; correct it"
+            f"--bus {text}: can:INTERFACE:CHANNEL is needed, such as "
+            "can:udp_multicast:239.74.163.2 or can:socketcan:vcan0; correct it"
         )
     arguments: dict[str, Any] = {"fd": True} if fd else {}
     if interface == "virtual":

@@ -84,15 +84,17 @@ def read_map(path: Path) -> UserMap:
     DeviceError
         With every fault of the file.
     """
+    file = path
     try:
         text = path.read_text(encoding="utf-8")
         document = tomllib.loads(text)
         dbc = ""
         if "dbc" in document:
-            dbc = (path.parent / str(document["dbc"])).read_text(encoding="cp1252")
+            file = path.parent / str(document["dbc"])
+            dbc = file.read_text(encoding="cp1252")
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise DeviceError(
-            f"{path}: cannot be read ({cause(error)}); a map is TOML in UTF-8, with its DBC in the "
+            f"{file}: cannot be read ({cause(error)}); a map is TOML in UTF-8, with its DBC in the "
             "same folder; check the path and the file"
         ) from None
     return parse_map(text, dbc, str(path))

@@ -5,6 +5,8 @@ A recording of the former version holds no estimates.
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import closing
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -116,7 +118,10 @@ def write_mdf(path: Path, found: Sequence[Segment], known: Any, out: Path) -> in
     from tirebench.wire.conditions import QUANTITIES as CONDITIONS
 
     count = 0
+    with closing(Recording(path)) as recording:
+        begun = datetime.fromtimestamp(1e-9 * recording.header.wall_ns, UTC)
     with MDF(version="4.10") as mdf:
+        mdf.start_time = begun
         for segment in found:
             strain, mine = 1e6 * segment.strain, f"wheel_{segment.wheel}_"
             title = f"wheel {segment.wheel} segment {segment.number}"

@@ -149,6 +149,16 @@ def completed(text: str) -> dict[str, Any] | None:
     }
 
 
+def whole_document(text: str) -> dict[str, Any] | None:
+    """Return the document of a file that is complete; None if it is no document of turns."""
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    known = isinstance(found, dict) and found.get("format") == FORMAT
+    return found if known and isinstance(found.get("turns"), list) else None
+
+
 def _unwritable(path: Path, error: OSError) -> RecordingError:
     return RecordingError(
         f"{path}: cannot be written ({cause(error)}); a file in a folder with free space is "

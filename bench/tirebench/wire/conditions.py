@@ -1,6 +1,6 @@
 """What the wheel does not send: travel speed, pressure, camber, turn rate, over device time.
 
-They come from options (one value each) or from a sidecar (``tirebench-conditions/2``, JSON) that
+They come from options (one value each) or from a sidecar (``tirebench-conditions/3``, JSON) that
 the emulator writes, and are held from one value to the next. A sidecar also tells where in device
 time each run of the campaign was played and what the rig measured, so that estimates can be
 compared.
@@ -11,7 +11,7 @@ Files hold what engineers say (km/h, bar, deg, N); inside everything is SI and I
 import json
 import math
 from bisect import bisect_right
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +120,18 @@ class Conditions:
     def constant(cls, *values: float, **known: float) -> "Conditions":
         """Return conditions that do not change, SI, by order or name."""
         return cls((0,), (condition(*values, **known),))
+
+    def over(self, base: "Conditions") -> "Conditions":
+        """Return `base` with what these constant conditions know in the place of its own."""
+        given = self.values[0]
+        times, values = base.t_us, base.values
+        if times[0] > 0:
+            times, values = (0, *times), (UNKNOWN, *values)
+        replaced = tuple(
+            tuple(own if math.isnan(new) else new for new, own in zip(given, row, strict=True))
+            for row in values
+        )
+        return replace(base, t_us=times, values=replaced)
 
     @property
     def known(self) -> tuple[str, ...]:

@@ -147,6 +147,12 @@ class Device:
         )
         if same and len(lateral) == gages:
             return
+        if same:
+            raise DeviceError(
+                f"{where}: its calibration has {len(lateral)} gages, but this wheel sends {gages}; "
+                'the numbers must agree; write "" in the map for a gage that is missing, or '
+                f"calibrate with {gages} gages"
+            )
         raise DeviceError(
             f"{where}: its gages are at {_millimetres(lateral)} mm (ISO), but the device "
             f"{self.name!r} has {_millimetres(self.lateral) if self.lateral else gages} of them; "
