@@ -353,5 +353,5 @@ def test_the_text_line_of_the_handbook_is_read_with_its_map() -> None:
     np.testing.assert_allclose(
         1e6 * block.content.strain, [[1203.5, 1187.0, 1241.5, 1190.0, 998.0]]
     )
-    assert wheels.heard[0].timeline.rate == 1000.0
+    assert wheels.heard[0].timeline.rate == 5000.0
     assert wheels.push(line.replace("998", "999").encode() + b"\n") == []  # its checksum is wrong
