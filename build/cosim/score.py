@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from cosim.calibrate import ALPHA, CAMBER, DRIVING, KAPPA, LOAD, SPEED
 from cosim.recording import STATES, STEP, Recording
 from cosim.wheels import OWN_FRICTION, WHEELS
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.fmu.virtual.coordinates import FRICTION, half_angle
+from tirelib.fmu.virtual.drive import ALPHA, CAMBER, DRIVING, KAPPA, LOAD, SPEED
 from tirelib.fmu.virtual.spec import friction_surface
 from tirelib.fmu.virtual.surface import Surface, read_surface
 from tirelib.measured.signal.lowpass import DEFAULT_ORDER, HALF_POWER, SUPPORT

@@ -17,7 +17,7 @@ from tirelib.cli.common import (
     write_json,
 )
 from tirelib.cli.estimate import exit_code, print_document
-from tirelib.cli.fmu_virtual import virtual
+from tirelib.cli.fmu_virtual import measure, virtual
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.core.errors import FormatError
@@ -101,6 +101,7 @@ def fmu() -> None:
 
 
 fmu.add_command(virtual)
+fmu.add_command(measure)
 
 
 @fmu.command(epilog=_BUILD)

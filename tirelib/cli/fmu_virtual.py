@@ -5,11 +5,12 @@ from pathlib import Path
 
 import click
 
-from tirelib.cli.common import FILE, NEW_FILE, output
+from tirelib.cli.common import FILE, NEW_FILE, NEW_FOLDER, output
 from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.core.errors import ParameterError
 from tirelib.fmu.parts import DEFAULT_RATE
 from tirelib.fmu.virtual.spec import build_virtual, default_surface, friction_surface
+from tirelib.fmu.virtual.surface import read_surface
 
 _EPILOG = """\b
 Examples:
@@ -88,3 +89,46 @@ def virtual(
     console.print(f"communication step up to {1e3 * samples_per_step / sample_rate:g} ms")
     console.print(f"written: {path} ({path.stat().st_size / 1e3:.0f} kB)")
     console.print(f"next: {shlex.join(['tirelib', 'fmu', 'check', str(path)])}")
+
+
+_MEASURE = """\b
+Examples:
+  tirelib fmu measure --out car
+  tirelib calibrate car --out car.toml
+  tirelib fmu build --calibration car.toml --out StrainTire.fmu --samples-per-step 10
+
+\b
+The calibration that a vehicle on VirtualTire.fmu needs: load 0.9 to 7.4 kN, slip angle to 5.8 deg,
+slip ratio -0.115 to 0.015, camber to 3.7 deg, 8 to 30 m/s, 2.3 bar, in 384 runs. The strain is that
+of VirtualTire.fmu, not that of the numerical rig (`tirelib rig`), so it takes seconds.
+"""
+
+
+@click.command(epilog=_MEASURE)
+@click.option("--out", metavar="DIR", type=NEW_FOLDER, required=True, help="Campaign folder.")
+@click.option(
+    "--seed",
+    default=1,
+    show_default=True,
+    type=click.IntRange(min=0),
+    help="Seed of one test day: noise, loads and gains.",
+)
+@click.option(
+    "--surface",
+    metavar="FILE.npz",
+    type=FILE,
+    help="Response surface of the tire. Default: that of the reference tire.",
+)
+@click.option("--force", is_flag=True, help="Write into a folder that is not empty.")
+@progress_options
+def measure(out: Path, seed: int, surface: Path | None, force: bool) -> None:
+    """Measure the virtual tire over what a car's wheels do; write a campaign."""
+    from tirelib.fmu.virtual.drive import drive
+    from tirelib.fmu.virtual.measure import measure as measured
+
+    known = read_surface(surface or default_surface())
+    with progress_bar("measuring", len(drive())) as progress:
+        runs = measured(known, out, seed=seed, overwrite=force, progress=progress)
+    console = output()
+    console.print(f"{runs} runs of the virtual tire in {out} (axes iso, seed {seed})")
+    console.print(f"next: {shlex.join(['tirelib', 'calibrate', str(out), '--out', 'car.toml'])}")
