@@ -2,6 +2,7 @@
 
 import json
 import math
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,10 +20,14 @@ from tirebench.protocols import CAN
 from tirebench.protocols.plan import ProtocolPlan
 from tirebench.protocols.user_map import parse_map
 from tirebench.recording.document import turn_document
+from tirebench.recording.export_results import write_mdf
 from tirebench.recording.header import RecordingHeader
 from tirebench.recording.recorder import Recorder
+from tirebench.recording.recording import Recording
+from tirebench.recording.segments import Segment
 from tirebench.wire.can_batch import joined, pack, same_kind
 from tirebench.wire.conditions import Conditions
+from tirebench.wire.timeline import Samples
 from tirelib.campaign import check_campaign, read_campaign
 
 TURNS = [replace(TURN, ready=0.02 * n, texts={"note": "restarted"} if n else {}) for n in range(3)]
@@ -122,3 +127,27 @@ def test_one_mdf4_file_has_all_of_it(recording: Path, tmp_path: Path) -> None:
     assert b"restarted" in note.samples[1]
     assert (event.samples[0], text.samples[0]) == (b"marker", b"wet, 50 %")
     assert text.timestamps[0] == pytest.approx(1.0)
+
+
+def segment(number: int, t_us: int, value: float) -> Segment:
+    rows = np.full((3, 5), value)
+    none = np.zeros(3, np.bool_)
+    block = Samples(number, "", 0, t_us, 0.001, rows, none, np.zeros((3, 5), np.bool_))
+    return Segment(2, number, 0, t_us, 0.001, [block])
+
+
+def test_segments_of_a_wheel_are_one_group_with_a_gap(recording: Path, tmp_path: Path) -> None:
+    found = [segment(1, 0, 1e-6), segment(2, 10_000, 2e-6), segment(3, 0, 3e-6)]
+    assert write_mdf(recording, found, Conditions.constant(18.0), tmp_path / "b.mf4") == 9
+    with closing(Recording(recording)) as opened:
+        header = opened.header
+    with MDF(tmp_path / "b.mf4") as mdf:
+        strain, number = mdf.get("wheel_2_strain_1"), mdf.get("wheel_2_strain_segment")
+        again = mdf.get("wheel_2_restart_1_strain_1")
+        begun = mdf.start_time.timestamp()
+        assert "wheel_2_strain_5" in mdf.to_dataframe(time_from_zero=False)
+    np.testing.assert_allclose(strain.samples, [1, 1, 1, np.nan, 2, 2, 2])
+    np.testing.assert_allclose(strain.timestamps, [0, 0.001, 0.002, 0.003, 0.01, 0.011, 0.012])
+    assert number.samples.tolist() == [1, 1, 1, 1, 2, 2, 2]
+    np.testing.assert_allclose(again.samples, 3.0)
+    assert begun == pytest.approx(1e-9 * header.wall_ns, abs=1e-3)

@@ -78,7 +78,11 @@ def train(
     full, links = calibrate_chain(observations, range(count), labelled("all gages"))
     if not any(full.has(quantity) for quantity in ("Fz", "alpha", "kappa", "Fy")):
         reasons = "; ".join(f"{quantity}: {why}" for quantity, why in links.refused.items())
-        raise CalibrationError(f"{observations.headers[0].name}: nothing to calibrate: {reasons}")
+        raise CalibrationError(
+            f"{observations.headers[0].name}: nothing to calibrate: {reasons}; a campaign needs "
+            "what the rig measured beside the strain (channels Fz, Fy, slip_angle, slip_ratio of "
+            "its runs): import both together with `tirelib import`"
+        )
     chains = {-1: full}
     for missing in range(count):
         if missing != centre and count > 3:

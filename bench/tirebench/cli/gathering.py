@@ -147,6 +147,7 @@ def _levels(link: Link, wheels: Wheels, seconds: float) -> dict[int, list[Level]
     found: dict[int, list[Level]] = {}
     cut: dict[int, Levels] = {}
     end = Deadline.after(NOBODY)
+    click.echo(f"{link.name}: waiting for the first frame, up to {NOBODY:g} s", err=True)
     while not end.expired:
         read = link.receive(end.sooner(0.2))
         if read is None:

@@ -4,7 +4,7 @@ A recording of the former version holds no estimates.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
@@ -109,45 +109,21 @@ def write_results(path: Path, out: Path, ending: str, wheel: int | None = None) 
 def write_mdf(path: Path, found: Sequence[Segment], known: Any, out: Path) -> int:
     """Write samples, conditions, estimates and events as one MDF 4.10 file; return the samples.
 
-    Channel groups: one for the strain of each segment of a wheel and one for its conditions, on the
-    wheel's clock; one for the estimates of each wheel and one for the events, since the recording
-    began.
+    Channel groups: one for the strain of each wheel and one for its conditions, on the wheel's
+    clock; where that clock starts again, two more, whose names say so. Between two segments stands
+    a row of NaN, and a channel has the number of each sample's segment. Then one group for the
+    estimates of each wheel and one for the events, since the recording began.
     """
-    from asammdf import MDF, Signal
+    from asammdf import MDF
 
-    from tirebench.wire.conditions import QUANTITIES as CONDITIONS
-
-    count = 0
     with closing(Recording(path)) as recording:
         begun = datetime.fromtimestamp(1e-9 * recording.header.wall_ns, UTC)
     with MDF(version="4.10") as mdf:
         mdf.start_time = begun
-        for segment in found:
-            strain, mine = 1e6 * segment.strain, f"wheel_{segment.wheel}_"
-            title = f"wheel {segment.wheel} segment {segment.number}"
-            times = 1e-6 * segment.t_us + segment.period * np.arange(len(strain))
-            mdf.append(
-                [
-                    Signal(strain[:, gage], times, "ustrain", f"{mine}strain_{gage + 1}")
-                    for gage in range(strain.shape[1])
-                ],
-                comment=title,
-            )
-            course = segment.known(known)
-            values = np.array(course.values)
-            mdf.append(
-                [
-                    Signal(
-                        np.asarray(from_si(values[:, column], unit, dimension)),
-                        1e-6 * np.array(course.t_us),
-                        unit,
-                        f"{mine}{name}",
-                    )
-                    for column, (name, (unit, dimension)) in enumerate(CONDITIONS.items())
-                ],
-                comment=f"{title}: conditions",
-            )
-            count += len(strain)
+        for prefix, title, mine in _clocks(found):
+            _append_samples(mdf, prefix, title, mine)
+            _append_conditions(mdf, prefix, f"{title}: conditions", mine, known)
+        count = sum(len(segment.strain) for segment in found)
         estimates, events = results(path)
         for wheel in sorted(set(estimates["wheel"])):
             chosen = [row for row, number in enumerate(estimates["wheel"]) if number == wheel]
@@ -157,6 +133,71 @@ def write_mdf(path: Path, found: Sequence[Segment], known: Any, out: Path) -> in
             _append(mdf, events, "", "events")
         mdf.save(out)
     return count
+
+
+def _clocks(found: Sequence[Segment]) -> Iterator[tuple[str, str, list[Segment]]]:
+    """Yield prefix, title and segments of each stretch of a wheel on one clock that goes on."""
+    for wheel in dict.fromkeys(segment.wheel for segment in found):
+        stretches: list[list[Segment]] = []
+        for segment in (one for one in found if one.wheel == wheel):
+            if not stretches or segment.t_us < stretches[-1][-1].end_us:
+                stretches.append([])
+            stretches[-1].append(segment)
+        for number, stretch in enumerate(stretches):
+            restart = f"restart_{number}_" if number else ""
+            title = f"wheel {wheel}" + (f", clock restarted {number} times" if number else "")
+            yield f"wheel_{wheel}_{restart}", title, stretch
+
+
+def _append_samples(mdf: Any, prefix: str, title: str, found: Sequence[Segment]) -> None:
+    """Append all strain of a wheel as one channel group."""
+    from asammdf import Signal
+
+    times, strain, numbers = [], [], []
+    for segment in found:
+        rows = 1e6 * segment.strain
+        moments = 1e-6 * segment.t_us + segment.period * np.arange(len(rows))
+        if times and moments[0] > times[-1][-1] + 1.5 * segment.period:  # the gap itself
+            times.append(times[-1][-1:] + segment.period)
+            strain.append(np.full((1, rows.shape[1]), np.nan))
+            numbers.append(np.full(1, numbers[-1][-1]))
+        times.append(moments)
+        strain.append(rows)
+        numbers.append(np.full(len(rows), segment.number, np.int32))
+    clock, values = np.concatenate(times), np.concatenate(strain)
+    signals = [
+        Signal(values[:, gage], clock, "ustrain", f"{prefix}strain_{gage + 1}")
+        for gage in range(values.shape[1])
+    ]
+    mdf.append(
+        [*signals, Signal(np.concatenate(numbers), clock, "", f"{prefix}strain_segment")],
+        comment=title,
+    )
+
+
+def _append_conditions(
+    mdf: Any, prefix: str, title: str, found: Sequence[Segment], known: Any
+) -> None:
+    """Append the conditions of a wheel as one channel group."""
+    from asammdf import Signal
+
+    from tirebench.wire.conditions import QUANTITIES as CONDITIONS
+
+    courses = [segment.known(known) for segment in found]
+    clock = 1e-6 * np.concatenate([course.t_us for course in courses])
+    values = np.concatenate([np.array(course.values) for course in courses])
+    mdf.append(
+        [
+            Signal(
+                np.asarray(from_si(values[:, column], unit, dimension)),
+                clock,
+                unit,
+                f"{prefix}{name}",
+            )
+            for column, (name, (unit, dimension)) in enumerate(CONDITIONS.items())
+        ],
+        comment=title,
+    )
 
 
 def _append(mdf: Any, rows: Rows, prefix: str, title: str) -> None:
