@@ -18,6 +18,7 @@ from tirebench.recording.new_file import whole
 from tirebench.recording.recording import Recording
 from tirebench.recording.segments import Segment
 from tirebench.recording.topics import ESTIMATE, EVENTS
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.units import from_si
 
 Rows = dict[str, list[Any]]
@@ -153,17 +154,19 @@ def _append_samples(mdf: Any, prefix: str, title: str, found: Sequence[Segment])
     """Append all strain of a wheel as one channel group."""
     from asammdf import Signal
 
-    times, strain, numbers = [], [], []
+    times: list[FloatArray] = []
+    strain: list[FloatArray] = []
+    numbers: list[IntArray] = []
     for segment in found:
         rows = 1e6 * segment.strain
         moments = 1e-6 * segment.t_us + segment.period * np.arange(len(rows))
         if times and moments[0] > times[-1][-1] + 1.5 * segment.period:  # the gap itself
             times.append(times[-1][-1:] + segment.period)
             strain.append(np.full((1, rows.shape[1]), np.nan))
-            numbers.append(np.full(1, numbers[-1][-1]))
+            numbers.append(numbers[-1][-1:])
         times.append(moments)
         strain.append(rows)
-        numbers.append(np.full(len(rows), segment.number, np.int32))
+        numbers.append(np.full(len(rows), segment.number))
     clock, values = np.concatenate(times), np.concatenate(strain)
     signals = [
         Signal(values[:, gage], clock, "ustrain", f"{prefix}strain_{gage + 1}")
