@@ -161,7 +161,7 @@ def _append_samples(mdf: Any, prefix: str, title: str, found: Sequence[Segment])
         rows = 1e6 * segment.strain
         moments = 1e-6 * segment.t_us + segment.period * np.arange(len(rows))
         if times and moments[0] > times[-1][-1] + 1.5 * segment.period:  # the gap itself
-            times.append(times[-1][-1:] + segment.period)
+            times.append(np.array([times[-1][-1] + segment.period]))
             strain.append(np.full((1, rows.shape[1]), np.nan))
             numbers.append(numbers[-1][-1:])
         times.append(moments)
