@@ -159,7 +159,7 @@ def _append_samples(mdf: Any, prefix: str, title: str, found: Sequence[Segment])
     numbers: list[IntArray] = []
     for segment in found:
         rows = 1e6 * segment.strain
-        moments = 1e-6 * segment.t_us + segment.period * np.arange(len(rows))
+        moments = 1e-6 * segment.t_us + segment.period * np.arange(len(rows), dtype=np.float64)
         if times and moments[0] > times[-1][-1] + 1.5 * segment.period:  # the gap itself
             times.append(np.array([times[-1][-1] + segment.period]))
             strain.append(np.full((1, rows.shape[1]), np.nan))
