@@ -13,7 +13,7 @@ from tirelib.campaign import (
     read_campaign,
     write_campaign,
 )
-from tirelib.inference.identify.force_notes import force_notes
+from tirelib.inference.identify.force_notes import force_notes, noise_note
 
 TIME = np.arange(20) / 10.0
 FULL = {
@@ -84,3 +84,12 @@ def test_slips_that_nobody_recorded_are_zero_and_said(tmp_path: Path) -> None:
         "run 0: slip ratio is unknown and taken as zero",
         "run 0: camber is unknown and taken as zero",
     )
+
+
+def test_a_noise_of_another_condition_is_told_from_that_of_a_rig() -> None:
+    assert noise_note("Fy", 207.0, 3450.0) == (
+        "the noise from repeats, 207 N, is 6 % of the rms of Fy; a rig repeats to 3 % or better: "
+        "these repeats differ in something that is not recorded or not mapped (camber, "
+        "temperature, wear, another tire), so no effect is told reliably",
+    )
+    assert noise_note("Fy", 13.0, 3450.0) == noise_note("Fy", np.nan, 3450.0) == ()

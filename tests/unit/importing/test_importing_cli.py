@@ -94,6 +94,27 @@ def test_map_and_out_are_asked_for(tmp_path: Path) -> None:
     assert call().exit_code == 2
 
 
+def test_a_condition_that_is_left_out_is_said_over_all_files(tmp_path: Path) -> None:
+    document = sae_map()
+    del document["channels"]["camber"]
+    upright, leaning = sae_columns(), sae_columns(seed=2)
+    upright["IA"], leaning["IA"] = 0.0 * upright["IA"], 0.0 * leaning["IA"] + 4.0
+    files = [
+        write_csv(tmp_path / f"{k}.csv", columns) for k, columns in enumerate((upright, leaning))
+    ]
+    known = "warning: column 'IA': it is known as camber, "
+    a_map = write_map(tmp_path, document)
+    result = call(*files, "--map", a_map, "--out", tmp_path / "both")
+    assert f"{known}varies (0 .. 4) and is not mapped" in result.stderr
+    assert "runs at different camber count as repeats" in result.stderr
+    result = call(files[1], "--map", a_map, "--out", tmp_path / "leaning")
+    assert f"{known}stands (at 4) and is not mapped" in result.stderr
+    result = call(files[0], "--map", a_map, "--out", tmp_path / "upright")
+    assert "is not mapped" not in result.stderr
+    result = call(*files, "--map", write_map(tmp_path, sae_map()), "--out", tmp_path / "whole")
+    assert "is not mapped" not in result.stderr
+
+
 def test_list_and_suggest_need_no_map(tmp_path: Path) -> None:
     file = write_csv(tmp_path / "a.csv", sae_columns())
     listed = call(file, "--list", "--json", tmp_path / "l.json")

@@ -301,3 +301,15 @@ def test_a_german_file_is_drafted_with_what_the_rig_held(tmp_path: Path) -> None
         "slip_angle": "\u00b0",
         "speed": "km/h",  # constant, as a rig holds it; a slip that is always 0 was not connected
     }
+
+
+def test_a_condition_that_a_file_holds_at_zero_is_mapped(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    rows = [f"0,{k};4,{k};{k};0;{40 + k};0" for k in range(9)]
+    names = "Zeit [s];Last [kN];SA [deg];Sturz [deg];Laufflächentemperatur [degC];Schlupf [%]"
+    file.write_text("\n".join([names, *rows]), encoding="utf-8")
+    draft = suggest_map(file)
+    channels = tomllib.loads(draft)["channels"]
+    assert channels["camber"] == {"column": "Sturz [deg]", "unit": "deg"}
+    assert set(channels) == {"time", "Fz", "slip_angle", "camber", "tread_temperature"}
+    assert '# "Schlupf [%]": 0 .. 0 %; known as slip_ratio, but it never changes, as a' in draft

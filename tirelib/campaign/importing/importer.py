@@ -27,6 +27,7 @@ from tirelib.campaign.importing.plans import (
     plan_problems,
     with_starts,
 )
+from tirelib.campaign.importing.unmapped import Unmapped
 from tirelib.campaign.model import CampaignHeader, Run, RunPlan
 from tirelib.campaign.problem import Problem, errors_of
 from tirelib.campaign.timebase import gage_time_problems
@@ -110,7 +111,8 @@ def import_campaign(
     finally:
         shutil.rmtree(staging, ignore_errors=True)
     notes = tuple(dict.fromkeys(work.notes))
-    return ImportReport(folder, header, tuple(imported), notes, (*work.rules.warnings, *warnings))
+    said = (*work.rules.warnings, *work.unmapped.warnings(), *warnings)
+    return ImportReport(folder, header, tuple(imported), notes, said)
 
 
 class _Import:
@@ -126,6 +128,7 @@ class _Import:
         self.notes: list[str] = []
         self.changes: list[str] = []  # of the data, by choice of the map
         self.rules, self.problems = parse_map(map_file, files[0].stem)
+        self.unmapped = Unmapped(self.rules)
         self._last: tuple[int, list[Piece]] | None = None
 
     def survey(self) -> tuple[CampaignHeader, list[ImportedRun]]:
@@ -172,6 +175,7 @@ class _Import:
             return self._last[1], []
         self._last = None  # one file in memory at a time
         table = read_table(self.files[place], self.rules.csv)
+        self.unmapped.look(table)
         changes = [note for note in table.notes if note.startswith("text = ")]
         self.notes += [f"{table.file}: {note}" for note in table.notes]
         table, done = mended(

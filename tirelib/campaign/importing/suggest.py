@@ -59,6 +59,7 @@ KNOWN_NAMES: Mapping[str, str] = {
     "T": "time",
     "TIMESTAMP": "time",
     "ZEIT": "time",
+    "LAST": "Fz",
     "RADLAST": "Fz",
     "AUFSTANDSKRAFT": "Fz",
     "SEITENKRAFT": "Fy",
@@ -79,6 +80,10 @@ KNOWN_NAMES: Mapping[str, str] = {
     "REIFENDRUCK": "pressure",
     "REIFENFUELLDRUCK": "pressure",
     "GESCHWINDIGKEIT": "speed",
+    "LAUFFLAECHENTEMPERATUR": "tread_temperature",
+    "REIFENTEMPERATUR": "tire_temperature",
+    "FAHRBAHNTEMPERATUR": "road_temperature",
+    "UMGEBUNGSTEMPERATUR": "ambient_temperature",
     "DREHZAHL": "omega",
     "RADDREHZAHL": "omega",
     "WHEELLOAD": "Fz",
@@ -124,6 +129,8 @@ LENGTHS = ("ring_radius_m", "tread_thickness_m", "belt_width_m", "innerliner_off
 """Lengths of a tire that a ring is fitted with."""
 CONSTANT = ("pressure", "speed")
 """Quantities that a rig may hold; anything else that never changes was not connected."""
+HELD = ("time", "slip_angle", "camber")
+"""Quantities that are mapped whatever they hold: other files may have them at other values."""
 ROLLING = (0.05, 3.0)
 """Radius at which any wheel rolls, m: that of a kart's wheel is .13, of an earth mover's 1.9."""
 _UMLAUTS = str.maketrans({"\u00c4": "AE", "\u00d6": "OE", "\u00dc": "UE"})
@@ -250,15 +257,19 @@ def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
     """
     table, summaries = list_columns(path, options)
     known: dict[str, ColumnSummary] = {}
-    others: list[ColumnSummary] = []
+    others: list[tuple[ColumnSummary, str]] = []
     for item in summaries:
-        steady = item.quantity in CONSTANT and item.low != 0.0
-        useless = item.low == item.high and not steady and item.quantity != "time" and item.rows > 1
-        if item.quantity and item.quantity not in known and not useless:
-            known[item.quantity] = item
+        steady = item.quantity in HELD or (item.quantity in CONSTANT and item.low != 0.0)
+        useless = item.low == item.high and not steady and item.rows > 1
+        if not item.quantity:
+            others.append((item, ""))
+        elif useless:
+            others.append((item, "it never changes, as a channel that was not connected"))
+        elif item.quantity in known:
+            others.append((item, f"{_quoted(known[item.quantity].name)} is mapped"))
         else:
-            others.append(item)
-    others += [known.pop(quantity) for quantity in _impossible(known)]
+            known[item.quantity] = item
+    others += [(known.pop(name), "no wheel rolls at this speed") for name in _impossible(known)]
     axes, reason = _guessed_axes(table, known)
     strains = [quantity for quantity in known if strain_number(quantity) is not None]
     lines = [
@@ -270,7 +281,7 @@ def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
         else 'kind = "sweep"  # or the kind of steady runs, with [set_points]',
         *[
             f"run_column = {_quoted(item.name)}  # a guess: each of its numbers is a run"
-            for item in others
+            for item, _ in others
             if _numbers_runs(item, table.columns[item.name].values)
         ][:1],
         "",
@@ -294,10 +305,9 @@ def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
         for quantity, item in known.items()
         if strains or not is_gage(quantity)
     ]
-    lines += [
-        f"# {_quoted(item.name)}: {item.low:g} .. {item.high:g} {item.unit}".rstrip()
-        for item in others
-    ]
+    for item, reason in others:
+        said = f"# {_quoted(item.name)}: {item.low:g} .. {item.high:g} {item.unit}".rstrip()
+        lines.append(said + (f"; known as {item.quantity}, but {reason}" if reason else ""))
     return "\n".join([*lines, ""])
 
 

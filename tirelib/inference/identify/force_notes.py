@@ -3,8 +3,14 @@
 import numpy as np
 
 from tirelib.campaign import Campaign, Run
+from tirelib.core.quantities import QUANTITIES
 from tirelib.inference.identify.force_data import FORCES, FREE_ROLLING
 from tirelib.inference.identify.strain_notes import named
+
+NOISY = 0.03
+"""Share of a force's rms above which its noise is more than that of a rig (1.7 % for the aligning
+torque of the tests' noisiest sweep, 6 % where a column of camber was left out): half would speak of
+sound torques, double would pass over that camber."""
 
 
 def force_notes(campaign: Campaign) -> tuple[str, ...]:
@@ -15,7 +21,6 @@ def force_notes(campaign: Campaign) -> tuple[str, ...]:
     """
     samples = 0
     lost: dict[str, list[int]] = {}
-    blank: dict[str, list[int]] = {}
     stood: dict[str, list[int]] = {}
     for run in campaign.runs():
         if not run.rig:
@@ -31,11 +36,6 @@ def force_notes(campaign: Campaign) -> tuple[str, ...]:
             for name in ("Fz", "slip_angle"):
                 if name not in run.rig:
                     stood.setdefault(name, []).append(run.plan.run)
-        slips = run.plan.kind not in FREE_ROLLING
-        if slips and "slip_ratio" not in run.rig and not np.isfinite(run.plan.slip_ratio):
-            blank.setdefault("slip ratio", []).append(run.plan.run)
-        if "camber" not in run.rig and not np.isfinite(run.plan.camber):
-            blank.setdefault("camber", []).append(run.plan.run)
     out = [f"{named(runs)}: {reason}; left out of the brush" for reason, runs in lost.items()]
     if samples:
         out.append(
@@ -46,8 +46,41 @@ def force_notes(campaign: Campaign) -> tuple[str, ...]:
         f"{named(runs)}: {name} was not measured; its set point is used"
         for name, runs in stood.items()
     ]
-    out += [f"{named(runs)}: {name} is unknown and taken as zero" for name, runs in blank.items()]
-    return tuple(out)
+    return (*out, *taken_as_zero(campaign))
+
+
+def taken_as_zero(campaign: Campaign) -> tuple[str, ...]:
+    """Return a sentence for each slip that is neither measured nor a set point."""
+    blank: dict[str, list[int]] = {}
+    for plan in campaign.plans:
+        ratio = plan.kind in FREE_ROLLING or np.isfinite(plan.slip_ratio)
+        wanted = {"slip_ratio": not ratio, "camber": not np.isfinite(plan.camber)}
+        if any(wanted.values()):
+            rig = campaign.load(plan).rig
+            for name in (name for name, asked in wanted.items() if asked and name not in rig):
+                blank.setdefault(name.replace("_", " "), []).append(plan.run)
+    return tuple(
+        f"{named(runs)}: {name} is unknown and taken as zero" for name, runs in blank.items()
+    )
+
+
+def noise_note(name: str, noise: float, size: float) -> tuple[str, ...]:
+    """Return a sentence if the noise of a force is too large to be that of repeats.
+
+    Parameters
+    ----------
+    name : str
+    noise, size : float, [N] or [N m]
+        Standard deviation of a point from repeats (NaN without), and the rms of the force.
+    """
+    if not noise > NOISY * size:
+        return ()
+    return (
+        f"the noise from repeats, {noise:.3g} {QUANTITIES[name].unit}, is {100 * noise / size:.0f} "
+        f"% of the rms of {name}; a rig repeats to {100 * NOISY:.0f} % or better: these repeats "
+        "differ in something that is not recorded or not mapped (camber, temperature, wear, "
+        "another tire), so no effect is told reliably",
+    )
 
 
 def _missing(run: Run) -> list[str]:

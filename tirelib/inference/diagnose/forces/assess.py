@@ -25,6 +25,7 @@ from tirelib.inference.diagnose.told import Assessed
 from tirelib.inference.identify.force_bench import Changes
 from tirelib.inference.identify.force_data import force_data
 from tirelib.inference.identify.force_noise import force_noise
+from tirelib.inference.identify.force_notes import noise_note, taken_as_zero
 from tirelib.inference.identify.force_points import ForcePoints, force_points
 from tirelib.inference.problems.force_plan import varies
 from tirelib.inference.problems.forces import ForceProblem
@@ -149,10 +150,13 @@ def force_cases(
     points = force_points(force_data(campaign))
     wanted = quantities_of(campaign, points, quantity)
     points = usable_points(campaign, model, points)
-    return [_case(campaign.header.name, model, points, name) for name in wanted]
+    notes = taken_as_zero(campaign)
+    return [_case(campaign.header.name, model, points, name, notes) for name in wanted]
 
 
-def _case(name: str, model: ForceModel, points: ForcePoints, quantity: str) -> ForceCase:
+def _case(
+    name: str, model: ForceModel, points: ForcePoints, quantity: str, notes: Sequence[str]
+) -> ForceCase:
     points = points.take(np.isfinite(getattr(points.data, quantity)))
     if len(points) < LEAST_POINTS:
         raise CalibrationError(
@@ -165,7 +169,7 @@ def _case(name: str, model: ForceModel, points: ForcePoints, quantity: str) -> F
             f"{name}: one {slip} only, so {quantity} says nothing about the brush; "
             "add runs with slip"
         )
-    messages = []
+    messages = list(notes)
     whole = points
     if len(points) > MOST_POINTS:
         step = int(np.ceil(len(points) / MOST_POINTS))
@@ -173,7 +177,9 @@ def _case(name: str, model: ForceModel, points: ForcePoints, quantity: str) -> F
         messages.append(
             f"{len(whole)} points, passes of the sweep; one in {step} is fitted ({len(points)})"
         )
-    noise, _, repeats = force_noise(whole, getattr(whole.data, quantity))
+    measured = getattr(whole.data, quantity)
+    noise, _, repeats = force_noise(whole, measured)
+    messages += noise_note(quantity, noise, float(np.sqrt(np.mean(measured**2))))
     problem = MeasuredForce.of(model.bench(points), quantity, noise)
     every = MeasuredForce.of(model.bench(whole), quantity, noise)
     return ForceCase(name, model, problem, every, noise, repeats, tuple(messages))
