@@ -33,6 +33,7 @@ from tirelib.inference.compare.strain import verdict_of
 from tirelib.inference.identify.error_bands import levels
 from tirelib.inference.identify.force_data import ForceData, force_data
 from tirelib.inference.identify.force_noise import force_noise
+from tirelib.inference.identify.force_notes import noise_note, taken_as_zero
 from tirelib.inference.identify.force_points import CELL_ANGLE, ForcePoints, force_points
 
 SLIP_LIMITS = {
@@ -235,7 +236,11 @@ def _compare(
         verdict,
         table,
         said,
-        _messages(campaign, name, points, verdict, rms / size, repeats),
+        (
+            *_messages(campaign, name, points, verdict, rms / size, repeats),
+            *noise_note(name, noise, size),
+            *taken_as_zero(campaign),
+        ),
         model.used,
         last_floor(model.history, name, data_hash),
     )
@@ -307,8 +312,8 @@ def _say(name: str, cell: ForceCell) -> str:
     sign = ", either sign, " if cell.by in SLIP_LIMITS else ", "
     return (
         f"At {kind} {range_of(cell)}{sign}the model's {name} is {_short(abs(cell.excess))} "
-        f"{UNITS[name]} too {size} in size (95 % \N{PLUS-MINUS SIGN} "
-        f"{_short(1.96 * cell.excess_std)}, {cell.points} points)."
+        f"\N{PLUS-MINUS SIGN} {_short(1.96 * cell.excess_std)} {UNITS[name]} too {size} in size "
+        f"(95 %, {cell.points} points)."
     )
 
 
