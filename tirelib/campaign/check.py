@@ -15,6 +15,7 @@ from tirelib.campaign.check_order import (
     RunSummary,
     force_sign_findings,
     force_sign_of,
+    moment_sign_of,
     order_findings,
     summary_of,
 )
@@ -101,6 +102,7 @@ def _run_problems(
     findings: list[RunFinding] = []
     summaries: list[RunSummary] = []
     signs: list[ForceSign] = []
+    moments: list[ForceSign] = []
     digests: list[tuple[str, str]] = []
     strained: list[bool] = []
     for done, plan in enumerate(plans, start=1):
@@ -112,11 +114,14 @@ def _run_problems(
             sound = not errors_of([*faults, *(item.problem for item in found)])
             summaries.append(summary_of(run, header, sound=sound))
             signs.append(force_sign_of(run))
+            moments.append(moment_sign_of(run))
             digests.append((plan.file, _digest(run)))
             strained += [run.strain is not None] if not errors_of(faults) else []
         if progress is not None:
             progress(done, len(plans))
     wrong, axes = force_sign_findings(signs, header)
+    if not wrong and not axes:  # a lateral force that is turned turns what the moment is held to
+        wrong, axes = force_sign_findings(moments, header)
     odd = {item.file for item in wrong}
     swapped, order = order_findings([s for s in summaries if s.file not in odd], header)
     problems = [*axes, *order, *gathered([*findings, *swapped, *wrong], len(plans))]

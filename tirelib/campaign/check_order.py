@@ -292,41 +292,60 @@ def _out_of_order(slopes: FloatArray, error: float) -> list[int]:
 def force_sign_findings(
     summaries: Sequence["ForceSign"], header: CampaignHeader
 ) -> tuple[list[RunFinding], list[Problem]]:
-    """Compare the signs of Fy and slip angle with the axis system: in ISO they are opposite."""
+    """Compare the signs of a force and of what it follows with the axis system."""
     clear = [item for item in summaries if item.share is not None]
     wrong = [item for item in clear if item.share is not None and item.share > 0.5]
     if not wrong:
         return [], []
-    same = "the same sign" if header.axes == "adapted_sae" else "opposite signs"
+    name, by = wrong[0].name, FOLLOWS[wrong[0].name]
+    same = signs_of(name, header.axes)
     if 2 * len(wrong) > len(clear):
         return [], [
             Problem(
                 "campaign.toml, axes",
-                f"wrong sign: Fy against slip angle contradicts axes = {header.axes!r} in "
+                f"wrong sign: {name} against {by} contradicts axes = {header.axes!r} in "
                 f"{len(wrong)} of {len(clear)} runs with a slip angle ({wrong[0].file} first)",
-                f"Fy and slip angle have {same} in these axes",
-                "name the axis system of the data, or correct the sign of Fy or slip_angle",
+                f"{name} and {by} have {same} in these axes",
+                f"name the axis system of the data, or correct the sign of {name}"
+                + (" or slip_angle" if name == "Fy" else ""),
             )
         ]
     return [
         finding(
             "sign",
             item.file,
-            "Fy",
-            "wrong sign: Fy against slip angle is not as in the other runs",
+            name,
+            f"wrong sign: {name} against {by} is not as in the other runs",
             f"they have {same} in axes = {header.axes!r}",
-            "correct the sign of Fy or slip_angle in this run",
+            f"correct the sign of {name}" + (" or slip_angle" if name == "Fy" else "") + " in "
+            "this run",
         )
         for item in wrong
     ], []
 
 
+FOLLOWS = {"Fy": "slip angle", "Mz": "Fy at small slip angles"}
+"""What the sign of a force is held against. The aligning moment is that of the lateral force behind
+the middle of the contact, Mz = -t Fy with the trail t > 0, in every axis system."""
+SMALL = 0.05
+"""Slip angle up to which the trail of a tire is clear, [rad]: it vanishes where the contact slides,
+from 5 deg on. Half (1.4 deg) leaves few samples, double (5.7 deg) is where the moment turns."""
+LEAST_TRAIL = 0.005
+"""Moment over force below which the sign of a sample says nothing, [m]: trails are 20 to 40 mm."""
+
+
+def signs_of(name: str, axes: str) -> str:
+    """Return in words how the signs of a force and of what it follows go together."""
+    return "the same sign" if name == "Fy" and axes == "adapted_sae" else "opposite signs"
+
+
 @dataclass(frozen=True, slots=True)
 class ForceSign:
-    """Share of a run's samples with a clear slip angle in which Fy has its sign (ISO)."""
+    """Share of a run's telling samples in which a force has the wrong sign (ISO)."""
 
     file: str
     share: float | None
+    name: str = "Fy"
 
 
 def force_sign_of(run: Run) -> ForceSign:
@@ -334,10 +353,31 @@ def force_sign_of(run: Run) -> ForceSign:
     if not {"Fy", "slip_angle"} <= set(run.rig):
         return ForceSign(run.plan.file, None)
     force, angle = run.rig["Fy"], run.rig["slip_angle"]
+    telling = _telling(run, 0.2)
+    return ForceSign(run.plan.file, _share(force * angle > 0.0, telling))
+
+
+def moment_sign_of(run: Run) -> ForceSign:
+    """Return how often Mz has the wrong sign; None where few angles are small, or Mz is."""
+    if not {"Fy", "Mz", "slip_angle"} <= set(run.rig):
+        return ForceSign(run.plan.file, None, "Mz")
+    force, moment = run.rig["Fy"], run.rig["Mz"]
+    telling = _telling(run, 0.5) & (np.abs(run.rig["slip_angle"]) < SMALL)
+    telling &= np.abs(moment) > LEAST_TRAIL * np.abs(force)
+    if "slip_ratio" in run.rig:  # a longitudinal force has a moment of its own
+        telling &= np.abs(run.rig["slip_ratio"]) < 0.02
+    return ForceSign(run.plan.file, _share(moment * force > 0.0, telling), "Mz")
+
+
+def _telling(run: Run, tilted: float) -> BoolArray:
+    """Return the samples whose slip angle and lateral force are clear."""
+    force, angle = run.rig["Fy"], run.rig["slip_angle"]
     load = np.abs(run.rig["Fz"]) if "Fz" in run.rig else np.full_like(force, 1e3)
     tilt = np.abs(run.rig["camber"]) if "camber" in run.rig else np.zeros_like(force)
-    # camber thrust may win at small angles: a slip angle counts from 1 deg and a fifth of camber
-    telling = (np.abs(angle) > 0.017) & (np.abs(angle) > 0.2 * tilt) & (np.abs(force) > 0.1 * load)
-    if np.count_nonzero(telling) < 5:
-        return ForceSign(run.plan.file, None)
-    return ForceSign(run.plan.file, float(np.mean(force[telling] * angle[telling] > 0.0)))
+    # camber may win at small angles: a slip angle counts from 1 deg and a share of camber
+    clear = (np.abs(angle) > 0.017) & (np.abs(angle) > tilted * tilt)
+    return np.asarray(clear & (np.abs(force) > 0.1 * load))
+
+
+def _share(wrong: BoolArray, telling: BoolArray) -> float | None:
+    return float(np.mean(wrong[telling])) if np.count_nonzero(telling) >= 5 else None

@@ -238,6 +238,10 @@ RIG_FAULTS = {
         "channel Fz: wrong sign: -2999 N in the median, axes = 'adapted_sae'; Fz of a loaded",
     ),
     "negative Fy": (with_rig(Fy=minus), "channel Fy: wrong sign: Fy against slip angle is not as"),
+    "negative Mz": (
+        with_rig(Mz=minus),
+        "channel Mz: wrong sign: Mz against Fy at small slip angles is not as in the other runs",
+    ),
     "nan": (
         with_rig(Mz=lambda x: np.where(np.arange(x.size) == 3, np.nan, x)),
         "channel Mz, sample 3 (t = 0.0300 s): 1 of 36 samples are not finite",
@@ -289,6 +293,21 @@ def test_signs_that_contradict_the_axes_everywhere_are_one_line(
         the_one(problems),
         f"campaign.toml, axes: wrong sign: Fy against slip angle contradicts axes = {axes!r} in "
         f"9 of 9 runs with a slip angle (runs/000.mf4 first); Fy and slip angle have {same}",
+    )
+
+
+@pytest.mark.parametrize("axes", ["iso", "sae", "adapted_sae"])
+def test_an_aligning_moment_turned_everywhere_is_one_line(
+    write: Write, sound_runs: Runs, axes: str
+) -> None:
+    header = replace(HEADER, axes=axes)
+    problems = check_campaign(write(changed(sound_runs, None, with_rig(Mz=minus)), header))
+    says(
+        the_one(problems),
+        f"campaign.toml, axes: wrong sign: Mz against Fy at small slip angles contradicts axes = "
+        f"{axes!r} in ",
+        "Mz and Fy at small slip angles have opposite signs in these axes",
+        "or correct the sign of Mz",
     )
 
 

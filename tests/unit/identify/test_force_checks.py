@@ -1,16 +1,19 @@
 """Slips that stand still, dead forces and wrong signs are refused before the brush is fitted."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.unit.force_campaigns import steady_runs, write_forces
 from tests.unit.identify.test_brush_fit import WIDE, make
 from tirelib.core.errors import CalibrationError
 from tirelib.inference.identify.brush_advice import LARGEST_ANGLE, candidates
 from tirelib.inference.identify.brush_fit import fit_brush
 from tirelib.inference.identify.brush_study import study_of
 from tirelib.inference.identify.force_data import ForceData
+from tirelib.inference.identify.forces import identify_forces
 
 
 @pytest.fixture(scope="module")
@@ -47,3 +50,16 @@ def test_advice_asks_for_no_slip_angle_that_no_rig_has(data: ForceData) -> None:
     assert np.rad2deg(stiff.slide["slip_angle"]) > LARGEST_ANGLE
     largest = max(float(np.abs(each.data.slip_angle).max()) for each in candidates(stiff))
     assert np.rad2deg(largest) == pytest.approx(LARGEST_ANGLE)
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_an_aligning_moment_of_the_wrong_sign_is_not_used(turn: float, tmp_path: Path) -> None:
+    runs = [
+        replace(run, rig={**run.rig, "Mz": turn * run.rig["Mz"]})
+        for run in steady_runs(repeats=1, moment=True)
+    ]
+    found = identify_forces(write_forces(tmp_path / "c", runs, "c"))
+    said = [note for note in found.notes if note.startswith("Mz is not used (R2 -")]
+    assert ("Mz" in found.fit.rmse) == (turn > 0.0) == (not said)
+    assert all("it has the wrong sign for axes = 'iso'" in note for note in said)
+    assert found.fit.values["lateral_stiffness"] > 0.0

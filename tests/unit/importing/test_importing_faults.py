@@ -216,6 +216,22 @@ def test_pacejka_axes_want_fy_and_slip_angle_of_one_sign(
     assert imported(file, by=sae_map(axes="iso")).header.axes == "iso"
 
 
+def test_an_aligning_moment_acts_behind_the_contact_in_all_axes(
+    refused: Refused, imported: Importer, tmp_path: Path
+) -> None:
+    columns = sae_columns()
+    columns["MZ"] = 0.03 * columns["FY"]
+    file = write_parquet(tmp_path / "a.parquet", columns)
+    moment = {"column": "MZ", "unit": "Nm"}
+    says(
+        refused(file, by=with_channels(Mz=moment)),
+        "column 'MZ' (Mz)",
+        "contradicts axes = 'sae' in 100 % of the samples with a small slip angle",
+        "write sign = -1 for the column that is turned",
+    )
+    assert imported(file, by=with_channels(Mz={**moment, "sign": -1})).header.axes == "sae"
+
+
 def test_a_fault_that_most_files_share_is_one_line(refused: Refused, tmp_path: Path) -> None:
     files = [
         write_parquet(tmp_path / f"{k}.parquet", changed("FZ", lambda x: -x)) for k in range(5)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tirelib.campaign.check_order import force_sign_of
+from tirelib.campaign.check_order import FOLLOWS, force_sign_of, moment_sign_of, signs_of
 from tirelib.campaign.check_rig import shown
 from tirelib.campaign.finding import RunFinding
 from tirelib.campaign.importing.mapfile import ImportMap
@@ -42,24 +42,31 @@ def sign_findings(source: str, rig: Mapping[str, FloatArray], rules: ImportMap) 
                 rules,
             )
         )
-    share = force_sign_of(Run(_PLAN, rig=rig)).share if _finite(rig) else None
-    if share is not None and share > 0.5:
-        same = "the same sign" if axes == "adapted_sae" else "opposite signs"
-        found.append(
-            _contradiction(
-                source,
-                "Fy",
-                f"wrong sign: Fy against slip angle contradicts axes = {axes!r} in "
-                f"{100.0 * share:.0f} % of the samples with a clear slip angle",
-                f"Fy and slip angle have {same} in these axes",
-                rules,
+    if not _finite(rig):
+        return found
+    run = Run(_PLAN, rig=rig)
+    for told, angles in (
+        (force_sign_of(run), "a clear slip angle"),
+        (moment_sign_of(run), "a small slip angle"),
+    ):
+        if told.share is not None and told.share > 0.5:
+            found.append(
+                _contradiction(
+                    source,
+                    told.name,
+                    f"wrong sign: {told.name} against {FOLLOWS[told.name]} contradicts axes = "
+                    f"{axes!r} in {100.0 * told.share:.0f} % of the samples with {angles}",
+                    f"{told.name} and {FOLLOWS[told.name]} have {signs_of(told.name, axes)} in "
+                    "these axes",
+                    rules,
+                )
             )
-        )
+            break  # a lateral force that is turned turns what the moment is held to
     return found
 
 
 def _finite(rig: Mapping[str, FloatArray]) -> bool:
-    names = ("Fy", "slip_angle", "Fz", "camber")
+    names = ("Fy", "Mz", "slip_angle", "Fz", "camber", "slip_ratio")
     return all(np.isfinite(rig[name]).all() for name in names if name in rig)
 
 

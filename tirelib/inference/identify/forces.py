@@ -36,6 +36,8 @@ MOST_COMPARED = 300
 """Points for the ring's pressure against the parabola; each has its own pressure profile."""
 LEAST_COMPARED = 4
 """Points of one load and pressure from which its stiffness can be fitted and points left out."""
+SMALL_ANGLE = 0.05
+"""Slip angle up to which the lateral force acts behind the middle of the contact, [rad]."""
 _STILL = 0.01
 """Slip ratio up to which a point rolls freely."""
 
@@ -98,7 +100,7 @@ def identify_forces(
     if ring is not None:
         data, ring = _with_pressure(data, ring, notes)
     tell("fitting the brush")
-    fit = fit_brush(data, tire=ring)
+    fit = _fit(data, ring, campaign.header.axes, notes)
     tell("intervals of the brush")
     study = study_of(fit, data)
     estimates = estimates_of(study, free_radius=campaign.header.tire.free_radius)
@@ -122,6 +124,23 @@ def identify_forces(
         tuple(notes),
         MappingProxyType(_numbers(campaign, fit, estimates, len(data))),
     )
+
+
+def _fit(data: ForceData, ring: Tire | None, axes: str, notes: list[str]) -> BrushFit:
+    """Return the fit to all forces, without an aligning moment that no brush can have."""
+    fit = fit_brush(data, tire=ring)
+    if fit.r2.get("Mz", 0.0) >= 0.0:
+        return fit
+    small = np.abs(data.slip_angle) < SMALL_ANGLE
+    trail = -float(np.nansum((data.Fy * data.Mz)[small]) / np.nansum((data.Fy**2)[small]))
+    why = "the brush leaves more than all of it"
+    if trail < 0.0:
+        why = (
+            f"it has the wrong sign for axes = {axes!r}, that of Fy at small slip angles; correct "
+            "the sign of the channel in the import map"
+        )
+    notes.append(f"Mz is not used (R2 {fit.r2['Mz']:.2f}): {why}")
+    return fit_brush(data, forces=[name for name in fit.rmse if name != "Mz"], tire=ring)
 
 
 def _read(campaign: Campaign) -> tuple[ForceData, list[str]]:
