@@ -30,7 +30,7 @@ from tirelib.core.errors import FormatError, ParameterError
 from tirelib.journey import explains_forces
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from tirelib.campaign import Campaign
     from tirelib.core.parameters import TireFile
@@ -270,8 +270,11 @@ def _for_force(
     document = plan_document(plan) | {"error": case.given, "error_unit": case.unit}
     if told is not None:
         document |= {"verdict": told["verdict"], "would_revive": told["next_test"]["would_revive"]}
+        other = told["next_test"]["what"]
         if plan.test is None:
-            document |= dict.fromkeys(("what", "message"), told["next_test"]["what"])
+            document |= dict.fromkeys(("what", "message"), other)
+        elif plan.test.hopeless:
+            document |= dict.fromkeys(("what", "message"), f"{document['message']}; {other}")
     return document, plan
 
 
@@ -359,33 +362,60 @@ def _condition(entry: dict[str, Any], axis: "Axis") -> str:
     return f"{min(told):.3g} to {max(told):.3g}"
 
 
+def _percent(chance: float | None) -> str:
+    return "-" if chance is None else f"{100 * chance:.0f} %"
+
+
+def _idle(candidates: "Sequence[Mapping[str, Any]]", keys: list[str]) -> set[str]:
+    """Return the conditions on which neither separation nor chance of any run depends."""
+    told = ("separation", "separation_std", "resolves_probability")
+    out = set()
+    for key in keys:
+        others = [name for name in keys if name != key]
+        by: dict[str, set[str]] = {}
+        for entry in candidates:
+            same = by.setdefault(repr([entry[name] for name in others]), set())
+            same.add(" ".join(f"{entry[name] or 0.0:.3g}" for name in told))
+        values = {repr(entry[key]) for entry in candidates}
+        if len(values) > 1 and all(len(same) == 1 for same in by.values()):
+            out.add(key)
+    return out
+
+
 def _say(document: dict[str, Any]) -> None:
+    from tirelib.inference.planning.criterion import LEAST
     from tirelib.inference.planning.envelope import AXES
 
     console = output()
     console.print(f"{document['campaign']}, {document['quantity']}: {document['why']}")
     console.print(f"  {document['message']}")
-    if not document["candidates"]:
+    candidates = document["candidates"]
+    if max((entry["separation"] for entry in candidates), default=0.0) < LEAST:
         return
     table = Table(box=SIMPLE_HEAD)
-    axes = [axis for axis in AXES.values() if axis.key in document["candidates"][0]]
+    axes = [axis for axis in AXES.values() if axis.key in candidates[0]]
+    idle = _idle(candidates, [axis.key for axis in axes])
     columns = [axis.quantity.heading for axis in axes]
-    for column in (*columns, "separation", "chance to resolve"):
+    for column in (*columns, "separation (chi-square)", "chance to resolve"):
         table.add_column(column, justify="right")
     table.add_column("hardest pair")
-    for entry in document["candidates"][:SHOWN]:
-        table.add_row(
-            *[_condition(entry, axis) for axis in axes],
+    rows = [
+        (
+            *["any" if axis.key in idle else _condition(entry, axis) for axis in axes],
             f"{entry['separation']:.1f} +- {entry['separation_std']:.1f}",
-            f"{100 * entry['resolves_probability']:.0f} %",
+            _percent(entry["resolves_probability"]),
             " / ".join(entry["pair"]),
         )
+        for entry in candidates
+    ]
+    for row in list(dict.fromkeys(rows))[:SHOWN]:
+        table.add_row(*row)
     console.print(table)
     median = document["random_median"]
     console.print(
-        f"  {len(document['candidates'])} runs looked at, {document['dropped']} dropped (beyond "
-        f"the tire's validity); any one of them: separation {median['separation']:.1f} (median), "
-        f"chance {100 * median['resolves_probability']:.0f} %"
+        f"  {len(candidates)} runs looked at, {document['dropped']} dropped (beyond the tire's "
+        f"validity); any one of them: separation {median['separation']:.1f} (median), chance "
+        f"{_percent(median['resolves_probability'])}"
     )
     for name, why in document["left_out"].items():
         console.print(f"  left out: {name}: {why}")

@@ -122,7 +122,7 @@ def _runs(test: NextTest) -> Table:
             "rank",
             *[QUANTITIES[name].heading for name in names],
             *["sweep"] * len(swept),
-            "separation",
+            "separation [chi-square]",
             "std",
             "chance to resolve [%]",
             "hardest pair",

@@ -87,6 +87,19 @@ def test_only_the_run_in_which_rivals_differ_resolves_them(
     assert pair.separation[1] > 10.0 > pair.separation[0]
 
 
+def test_rivals_that_are_both_out_already_have_no_chance_to_leave(
+    rivals: tuple[Ahead, Hypotheses],
+) -> None:
+    ahead, hypotheses = rivals
+    bend, twist = (hypotheses.at([name]) for name in ("bend", "twist"))
+    assert bend is not None
+    assert twist is not None
+    (pair,) = next_runs(ahead, (bend, twist), max(bend.p, twist.p))
+    assert not pair.resolved
+    assert np.isnan(pair.chance).all()
+    assert pair.separation[1] > 10.0 > pair.separation[0]
+
+
 def test_an_effect_that_is_there_puts_no_effect_out_and_not_the_other_way_round(
     rivals: tuple[Ahead, Hypotheses],
 ) -> None:

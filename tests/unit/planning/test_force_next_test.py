@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from tests.unit.planning.drifting import NOISE, PRESSURES, case, side_force
+from tirelib.cli.next_test import _idle
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
 from tirelib.inference.diagnose.forces.assess import ForceAssessment, ForceCase, assess_forces
 from tirelib.inference.diagnose.forces.document import force_diagnosis_document
 from tirelib.inference.diagnose.forces.models import plain_tires
 from tirelib.inference.planning.criterion import NOTHING, NextTest
-from tirelib.inference.planning.document import plan_document, plan_force_test
+from tirelib.inference.planning.document import Plan, advice, plan_document, plan_force_test
 from tirelib.inference.planning.envelope import Envelope
 from tirelib.inference.planning.force_runs import bench_ahead, force_axes
 from tirelib.inference.planning.suspects import given_suspects, suspects_of
@@ -172,6 +173,43 @@ def test_a_point_ahead_is_told_in_engineers_units_and_repeats_add() -> None:
     reached = list(test.pairs[0].repeats.values())
     assert reached == sorted(reached)
     assert reached[-1] <= test.pairs[0].limit
+
+
+def test_a_run_that_separates_nothing_is_said_so_without_a_chance() -> None:
+    test, suspects = planned(), given_suspects(PAIR, [], CATALOGUE, "Fy")
+    none = np.full(len(test.points), np.nan)
+
+    def said(separation: float) -> str:
+        pairs = tuple(
+            replace(p, resolved=False, separation=np.full(none.size, separation), probability=none)
+            for p in test.pairs
+        )
+        score = np.full(len(test.points), separation)
+        planned_so = replace(test, pairs=pairs, score=score, probability=none)
+        return advice(Plan(suspects, planned_so, {}, 20.0, "x", "Fy"))
+
+    assert said(0.0) == (
+        "No run of this envelope separates friction_pressure and friction_drift (separation at "
+        "most 0.0 in chi-square)"
+    )
+    assert "(chi-square 30.0); the present runs reject both as they stand, so no" in said(30.0)
+
+
+def test_conditions_that_matter_to_no_suspect_are_merged() -> None:
+    runs = [
+        {
+            "load_N": load,
+            "speed_kmh": speed,
+            "separation": load / 1e3,
+            "separation_std": 1.0,
+            "resolves_probability": None,
+        }
+        for load in (2e3, 4e3)
+        for speed in (20.0, 60.0)
+    ]
+    assert _idle(runs, ["load_N", "speed_kmh"]) == {"speed_kmh"}
+    runs[0]["separation"] = 7.0
+    assert _idle(runs, ["load_N", "speed_kmh"]) == set()
 
 
 def test_the_whole_plan_again_shows_an_effect_more_likely() -> None:

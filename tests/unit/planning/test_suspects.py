@@ -103,6 +103,8 @@ def test_where_nothing_is_in_doubt_there_is_no_plan(diagnosis: dict[str, Any]) -
     assert document["candidates"] == []
     assert document["best"] is None
     assert "nothing is in doubt" in document["message"]
+    named = " ".join(diagnosis["named"])
+    assert ("give --suspects low_pass" in document["why"]) == (named == "low_pass")
 
 
 def test_a_diagnosis_with_strange_effects_is_refused() -> None:

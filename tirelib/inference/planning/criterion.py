@@ -3,11 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from tirelib.core.arrays import FloatArray
 from tirelib.inference.planning.envelope import Envelope
 
 NOTHING = "no_effect"
 """Name of the rival that needs no further effect."""
+LEAST = 1.0
+"""Separation below which a run tells nothing: noise alone moves the chi-square of one number so."""
 WANTED = 20.0
 """Separation that one asks for: odds of e^10 against the wrong rival."""
 REPEATS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
@@ -86,7 +90,7 @@ class PairForecast:
     separation : shape (n,)
         Expected further chi-square by one run.
     probability : shape (n,)
-        That one run puts one of them out of it.
+        That one run puts one of them out of it; NaN where both are out already.
     repeats : mapping of number to float
         Separation by so many repeats of the best run.
     limit : float
@@ -149,3 +153,10 @@ class NextTest:
     def open_pairs(self) -> tuple[PairForecast, ...]:
         """Pairs that the present runs do not part."""
         return tuple(pair for pair in self.pairs if not pair.resolved)
+
+    @property
+    def hopeless(self) -> bool:
+        """Whether no run parts any of the open pairs."""
+        return bool(self.open_pairs) and all(
+            float(np.max(pair.separation)) < LEAST for pair in self.open_pairs
+        )

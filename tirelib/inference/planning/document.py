@@ -200,7 +200,7 @@ def plan_document(plan: Plan) -> dict[str, Any]:
         "best": candidates[0],
         "random_median": {
             "separation": float(np.median(test.score)),
-            "resolves_probability": float(np.mean(test.probability)),
+            "resolves_probability": _known(float(np.mean(test.probability))),
         },
         "repeats": _repeats(plan, test),
         "envelope": _envelope(test.envelope),
@@ -225,9 +225,14 @@ def _candidate(test: NextTest, k: int) -> dict[str, Any]:
         **_slips(test.envelope),
         "separation": float(test.score[k]),
         "separation_std": float(test.std[k]),
-        "resolves_probability": float(test.probability[k]),
+        "resolves_probability": _known(float(test.probability[k])),
         "pair": list(test.pairs[test.hardest[k]].names),
     }
+
+
+def _known(chance: float) -> float | None:
+    """Return a chance; None where both suspects are out of the confidence set already."""
+    return chance if np.isfinite(chance) else None
 
 
 def _slips(envelope: Envelope) -> dict[str, Any]:
@@ -246,7 +251,7 @@ def _present(pair: PairForecast) -> dict[str, Any]:
         "better": pair.better,
         "resolved": pair.resolved,
         "best_run_separation": float(pair.separation[0]),
-        "best_run_probability": float(pair.probability[0]),
+        "best_run_probability": _known(float(pair.probability[0])),
     }
 
 
@@ -312,11 +317,22 @@ def _said(pair: PairForecast) -> str:
 
 
 def _advised(plan: Plan, test: NextTest) -> str:
+    if test.hopeless:
+        return "; ".join(
+            f"No run of this envelope separates {_between(pair)} (separation at most "
+            f"{float(np.max(pair.separation)):.1f} in chi-square)"
+            for pair in test.open_pairs
+        )
     best, chance = test.points[0], float(test.probability[0])
     pair = test.pairs[test.hardest[0]]
-    where = test.envelope.text(best)
-    between = " and ".join(name.replace(NOTHING, "no effect") for name in pair.names)
-    if chance < PROMISING:
+    where, between = test.envelope.text(best), _between(pair)
+    if not np.isfinite(chance):
+        text = (
+            f"measure {where}: it separates {between} best (chi-square "
+            f"{float(test.score[0]):.1f}); the present runs reject both as they stand, so no "
+            "chance is given"
+        )
+    elif chance < PROMISING:
         text = (
             f"no run in the envelope is likely to separate {between}: the best, {where}, does with "
             f"a chance of {100 * chance:.0f} %"
@@ -335,6 +351,10 @@ def _advised(plan: Plan, test: NextTest) -> str:
     elif needed is not None and needed > 1:
         text += f"; {needed} repeats of it reach a separation of {plan.wanted:.0f}"
     return text
+
+
+def _between(pair: PairForecast) -> str:
+    return " and ".join(name.replace(NOTHING, "no effect") for name in pair.names)
 
 
 def _weak(plan: Plan) -> list[str]:

@@ -135,11 +135,12 @@ def next_test(
     parted = next_runs(runs.ahead(points, np.ones(len(points))), fits, alpha)
     open_ = [pair for pair in parted if not pair.resolved] or parted
     size = np.array([pair.separation for pair in open_])
-    chance = np.mean([pair.chance for pair in open_], axis=0)
+    told = [pair.chance for pair in open_ if np.isfinite(pair.chance).all()]
+    chance = np.mean(told, axis=0) if told else np.full(len(points), np.nan)
     hardest = np.argmin(size, axis=0)
     score = np.min(size, axis=0)
     std = np.array([open_[pair].std[run] for run, pair in enumerate(hardest)])
-    order = np.lexsort((-score, -np.round(chance, 3)))
+    order = np.lexsort((-score, -np.round(np.nan_to_num(chance), 3)))
     tell("repeats of the best run")
     best = np.repeat(points[order[:1]], len(REPEATS) + 1, axis=0)
     again = next_runs(runs.ahead(best, np.array([*REPEATS, ENDLESS])), fits, alpha)

@@ -84,7 +84,10 @@ def suspects_of(told: Mapping[str, Any], catalogue: Mapping[str, Effect]) -> Sus
             chosen = [name, *doubtful][:MOST_SUSPECTS]
             return _of(chosen, others, entries, catalogue, False, why)
     if named or not alive:
-        return Suspects((), (), False, "nothing is in doubt")
+        why = "nothing is in doubt"
+        if named:
+            why += f"; for a run that would confirm {named[0]} give --suspects {named[0]}"
+        return Suspects((), (), False, why)
     why = f"no more than a hint: {', '.join(alive[:MOST_SUSPECTS])}"
     return _of(alive[:MOST_SUSPECTS], [], entries, catalogue, True, why)
 

@@ -50,6 +50,7 @@ class Parted:
         Whether the present runs leave exactly one of them in the confidence set.
     chance : shape (n_ahead,)
         That a run puts one of them out of it, over the odds that the present runs give to either.
+        NaN where the present runs have put both out: neither can leave it.
     separation, std : shape (n_ahead,)
         Mean rise of the likelihood ratio against the wrong one, the smaller of both directions, and
         its standard deviation over the draws.
@@ -93,6 +94,8 @@ def next_runs(
         ]
         total = sum(weight for weight, _ in ways) or 1.0
         chance = sum(weight / total * way[0] for weight, way in ways)
+        if max(one.p, two.p) <= alpha:  # both are out of the confidence set: neither can leave it
+            chance = np.full(np.shape(chance), np.nan)
         rise, std = (np.array([way[k] for _, way in ways]) for k in (1, 2))
         least = np.argmin(rise, axis=0)[None]
         out.append(
