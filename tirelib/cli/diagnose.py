@@ -155,17 +155,25 @@ def _say(document: dict[str, Any], lines: Sequence[tuple[str, str]]) -> None:
     )
     for what, said in lines:
         console.print(f"  {what}: {said}")
-    for step in document.get("steps", []):
+    for place, step in enumerate(document.get("steps", [])):
         console.print(
-            f"  with {step['effect']}: error {step['error']:.3g}, held out "
-            f"{step['heldout_error']:.3g}"
+            f"  {'then +' if place else 'with'} {step['effect']}: error {step['error']:.3g}, held "
+            f"out {step['heldout_error']:.3g}"
         )
     for line in document["messages"]:
         console.print(f"  {line}")
-    console.print(_table(document["candidates"][:SHOWN]))
+    console.print(_table(document))
 
 
-def _table(candidates: list[dict[str, Any]]) -> Table:
+def _table(document: dict[str, Any]) -> Table:
+    from tirelib.report.explanation import mark_of
+
+    every = document["candidates"]
+    candidates = [
+        entry
+        for place, entry in enumerate(every)
+        if place < SHOWN or mark_of(document, entry) != entry["level"]
+    ]
     table = Table(box=SIMPLE_HEAD)
     longest = max((len(entry["effect"]) for entry in candidates), default=0)
     for column in (
@@ -188,7 +196,7 @@ def _table(candidates: list[dict[str, Any]]) -> Table:
         held = entry["heldout_error_after"]
         table.add_row(
             entry["effect"],
-            entry["level"],
+            mark_of(document, entry),
             f"{entry['score'] / entry['threshold']:.2f}",
             _numbers(entry["strength"]),
             _numbers(entry["std"]),

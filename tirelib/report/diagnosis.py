@@ -11,14 +11,14 @@ from tirelib.inference.diagnose.document import Assessment
 from tirelib.inference.diagnose.forces.assess import ForceAssessment
 from tirelib.report.comparison import BRUSH, METHOD, RING
 from tirelib.report.error_sentences import fold_name
-from tirelib.report.explanation import titled
+from tirelib.report.explanation import STANDS_OUT, mark_of, titled
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.figures.force_left import force_maps
 from tirelib.report.figures.strain_left import strain_maps
 from tirelib.report.figures.waterfall import Step, waterfall, waterfall_of
 from tirelib.report.page import Table, number, numbers, unit_name
 from tirelib.report.parts_page import Part, write_parts_page
-from tirelib.report.style import BLUE, FAINT, RED
+from tirelib.report.style import BLUE, FAINT, INK, RED
 
 TITLE = "Which effect is missing"
 METHOD_TEXT = (
@@ -35,7 +35,7 @@ METHOD_TEXT = (
 )
 LEAST_SHOWN = 0.01
 """Left end of the logarithmic scale of scores."""
-_LEVELS = {"alarm": RED, "hint": BLUE, "quiet": FAINT}
+_LEVELS = {"alarm": RED, "hint": BLUE, "quiet": FAINT, STANDS_OUT: INK}
 
 
 def write_diagnosis(
@@ -90,7 +90,7 @@ def parts_of(
             "candidates",
             METHOD_TEXT,
             tables=[_candidates(told)],
-            plots=[_scores(told["candidates"])] if told["candidates"] else [],
+            plots=[_scores(told)] if told["candidates"] else [],
         ),
         Part("Error", "error", tables=[_errors(told)], plots=_falls(told, history)),
         Part("What is left", "left", _left(told["unexplained"]), plots=maps),
@@ -127,7 +127,7 @@ def _candidates(told: Mapping[str, Any]) -> Table:
         told["candidates"],
         {
             "effect": lambda entry: entry["effect"],
-            "level": lambda entry: entry["level"],
+            "level": lambda entry: mark_of(told, entry),
             "in range": lambda entry: "yes" if entry["in_range"] else "no",
             "twins (angle)": lambda entry: ", ".join(
                 f"{twin['effect']} {twin['angle_deg']:.0f}\u00b0" for twin in entry["twins"]
@@ -148,8 +148,10 @@ def _candidates(told: Mapping[str, Any]) -> Table:
     )
 
 
-def _scores(candidates: Sequence[Mapping[str, Any]]) -> Plot:
+def _scores(told: Mapping[str, Any]) -> Plot:
     """Return the scores over their thresholds."""
+    candidates = told["candidates"]
+    marks = [mark_of(told, entry) for entry in candidates]
     names = [entry["effect"] for entry in candidates]
     ratio = [entry["score"] / entry["threshold"] for entry in candidates]
     figure = go.Figure(
@@ -157,8 +159,9 @@ def _scores(candidates: Sequence[Mapping[str, Any]]) -> Plot:
             x=np.maximum(np.round(ratio, 4), LEAST_SHOWN),
             y=names,
             orientation="h",
-            marker={"color": [_LEVELS[entry["level"]] for entry in candidates]},
-            hovertemplate="%{y}: %{x:.3g}<extra></extra>",
+            marker={"color": [_LEVELS[mark] for mark in marks]},
+            customdata=np.round(ratio, 4),
+            hovertemplate="%{y}: %{customdata:.3g}<extra></extra>",
         )
     )
     figure.add_vline(x=1.0, line={"dash": "dot", "color": FAINT})
@@ -172,15 +175,27 @@ def _scores(candidates: Sequence[Mapping[str, Any]]) -> Plot:
     return Plot(
         "scores",
         "Score over threshold",
-        "Red: alarm; blue: hint; gray: quiet. A gray effect beyond the threshold is not needed "
-        "where what is named is fitted.",
+        _caption(told, marks, ratio),
         figure,
         ["effect", "score / threshold", "level"],
         [
-            [entry["effect"], each, entry["level"]]
-            for entry, each in zip(candidates, ratio, strict=True)
+            [entry["effect"], each, mark]
+            for entry, each, mark in zip(candidates, ratio, marks, strict=True)
         ],
     )
+
+
+def _caption(told: Mapping[str, Any], marks: Sequence[str], ratio: Sequence[float]) -> str:
+    """Return what the colors of the scores mean on this page."""
+    text = "Orange: alarm; blue: hint; gray: quiet."
+    if min(ratio) < LEAST_SHOWN:
+        text += f" The axis begins at {LEAST_SHOWN}; a smaller score is drawn there."
+    if STANDS_OUT in marks:
+        return f"{text} Black: {STANDS_OUT} beside what is named, where a law does not fit."
+    beyond = any(mark == "quiet" and r > 1.0 for mark, r in zip(marks, ratio, strict=True))
+    if beyond and told["verdict"] in ("named", "indistinguishable"):
+        text += " A gray effect beyond the threshold is not needed where what is named is fitted."
+    return text
 
 
 def _errors(told: Mapping[str, Any]) -> Table:

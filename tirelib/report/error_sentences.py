@@ -1,6 +1,6 @@
 """The error before and after, and what was held out, in sentences."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -72,6 +72,13 @@ def unmoved(told: Mapping[str, Any]) -> list[str]:
     before, after = told["heldout_error_before"], told["heldout_error_after"]
     pairs = [(f"The error of the {runs_or_points(told)} held out", before, after)]
     folds = told["held_out"] if len(told["held_out"]) > 1 else ()
+    if all(is_known(before) and is_known(after) for _, before, after in pairs) and _none_fell(
+        folds
+    ):
+        return [
+            f"No error on the {runs_or_points(told)} held out fell, in none of {len(folds)} parts: "
+            f"{said_error(before)} before, {said_error(after)} after, on average."
+        ]
     pairs += [
         (f"The error with {fold_name(fold)} held out", fold["error_before"], fold["error_after"])
         for fold in folds
@@ -89,9 +96,23 @@ def held_out_line(told: Mapping[str, Any]) -> str:
     if not is_known(before) or not is_known(after):
         return "Nothing could be held out of the fit to check it."
     if _fell(before, after):
-        fell = f"On what was held out of the fit it {_moves(before, after)}."
+        fell = f"On what was held out of the fit it {_moves(before, after)}{_worst(told)}."
         return " ".join([fell, *unmoved(told)])
     return " ".join(unmoved(told))
+
+
+def _worst(told: Mapping[str, Any]) -> str:
+    """Name the held-out part with the largest error, where there are several."""
+    folds = [
+        fold
+        for fold in told.get("held_out", ())
+        if is_known(fold["error_before"]) and is_known(fold["error_after"])
+    ]
+    if len(folds) < 2:
+        return ""
+    worst = max(folds, key=lambda fold: float(fold["error_after"]))
+    moved = _moves(worst["error_before"], worst["error_after"])
+    return f" (worst: {fold_name(worst)}, where it {moved})"
 
 
 def fold_name(fold: Mapping[str, Any]) -> str:
@@ -103,6 +124,14 @@ def fold_name(fold: Mapping[str, Any]) -> str:
     size = f"{fold['runs']} runs" if "runs" in fold else f"{fold['points']} points"
     usual = f"the {fold['condition']} {number(fold['value'], 4)} {fold['unit']}"
     return f"{names.get(fold['condition'], usual)} ({size})"
+
+
+def _none_fell(folds: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether there are several held-out parts and the error falls in none."""
+    ends = [(fold["error_before"], fold["error_after"]) for fold in folds]
+    return len(ends) > 2 and all(
+        is_known(old) and is_known(new) and not _fell(old, new) for old, new in ends
+    )
 
 
 def _fell(before: float, after: float) -> bool:
@@ -126,7 +155,15 @@ def _floor(told: Mapping[str, Any], after: float) -> str:
     if said_error(floor) == said_error(after):
         if told.get("verdict") in ("unknown", "form_inadequate"):
             return " Noise and the structure of a tire can be as large, but not of this shape."
-        return " All that is left is noise and the structure of a tire."
+        raw = ""
+        if told["error_unit"] == "noise":
+            size = number(told["residual_rms_after"], SENSE)
+            raw = f", {size} {unit_name(told['residual_rms_unit'])}"
+        unit = "times the noise" if raw else unit_name(told["error_unit"])
+        return (
+            f" What is left ({said_error(after)} {unit}{raw}) is no more than simulated tires "
+            "leave; a missing effect of this size cannot be excluded."
+        )
     return f" Noise and the structure of a tire explain {said_error(floor)} of what is left."
 
 

@@ -26,6 +26,9 @@ TITLES = {
 """Title of each line, by its key in a document's `explanation`."""
 MISSED = 0.5
 """Chance to be found below which an effect is missed more often than not."""
+STANDS_OUT = "stands out"
+"""Mark of an effect that stands out beside what is named, where a law does not fit: its level is
+that beside the model as it is."""
 SHOWN = 3
 """Other effects that a sentence lists by name."""
 
@@ -89,10 +92,7 @@ def _missing(told: Mapping[str, Any]) -> str:
             f"model{once}."
         )
     if verdict == "unknown":
-        where = told["unexplained"].get("where")
-        text = where.get("text") if isinstance(where, Mapping) else where
-        stands = f" It appears {text}." if text else ""
-        return f"Something that no effect of the catalogue explains.{stands}"
+        return f"Something that no effect of the catalogue explains.{_lies(told, 'It')}"
     if verdict == "indistinguishable":
         listed = " or ".join(f"{name} ({_title(told, name)})" for name in named)
         return f"One of these, and these measurements do not show which: {listed}."
@@ -103,7 +103,26 @@ def _missing(told: Mapping[str, Any]) -> str:
         return f"{effects}."
     return (
         f"{effects}. More is left than structure explains: a law is not right, or more is missing."
+        f"{_lies(told, 'What is left')}"
     )
+
+
+def mark_of(told: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
+    """Return an effect's level as tables and figures mark it.
+
+    What stands out beside the named set has a mark of its own.
+    """
+    beside = told["verdict"] == "form_inadequate" and entry["effect"] == told["misfit_of"]
+    return STANDS_OUT if beside and entry["effect"] not in told["named"] else str(entry["level"])
+
+
+def _lies(told: Mapping[str, Any], what: str) -> str:
+    """Return where the misfit lies and what it goes with."""
+    texts = [told["unexplained"].get(key) for key in ("where", "scaling")]
+    where, scaling = (text.get("text") if isinstance(text, Mapping) else text for text in texts)
+    if not where:
+        return ""
+    return f" {what} appears {where}" + (f"; it {scaling}." if scaling else ".")
 
 
 def _sure(told: Mapping[str, Any]) -> str:
@@ -189,6 +208,8 @@ def _alternatives(told: Mapping[str, Any]) -> list[str]:
         for e in told["candidates"]
         if e["effect"] not in named and e["level"] != "quiet"
     ]
+    if told["verdict"] == "form_inadequate":
+        return []
     if others:
         return [f"Also conspicuous, but not needed in addition to what is named: {_some(others)}."]
     return ["No other effect of the catalogue explains these measurements as well."]
@@ -253,9 +274,11 @@ def _next(told: Mapping[str, Any], given: Sequence[str]) -> str:
     if told["verdict"] in ("named", "form_inadequate"):
         option = () if told["quantity"] == "strain" else ("--quantity", told["quantity"])
         command = ["tirelib", "add", *told["named"], *given, *option, "--out", "M2.toml"]
+        beside = [e["effect"] for e in told["candidates"] if mark_of(told, e) == STANDS_OUT]
+        more = f" What stands out in addition is {listed(beside)}." if beside else ""
         return (
             f"Add {'it' if len(told['named']) == 1 else 'them together'}: {shlex.join(command)}; "
-            "then diagnose again with the new model."
+            f"then diagnose again with the new model.{more}"
         )
     what = str(told["next_test"]["what"]).rstrip(".")
     if told["verdict"] == "none" and _misfitted(told):

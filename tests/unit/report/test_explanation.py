@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from tirelib.report.error_sentences import error_line, held_out_line, unmoved
-from tirelib.report.explanation import explained
+from tirelib.report.explanation import explained, mark_of
 
 
 def candidate(effect: str, **changes: Any) -> dict[str, Any]:
@@ -252,6 +252,35 @@ def test_a_rejected_model_says_what_stands_out(verdict: str, said: str) -> None:
     assert said in told.sure
 
 
+def test_what_stands_out_beside_the_named_effects_has_a_mark_and_is_told() -> None:
+    left = {"where": "at the ends of load", "scaling": "rises with pressure"}
+    told = diagnosis(verdict="form_inadequate", misfit_of="shear", unexplained=left)
+    marks = [mark_of(told, entry) for entry in told["candidates"]]
+    assert marks == ["alarm", "stands out"]
+    assert [entry["level"] for entry in told["candidates"]] == ["alarm", "quiet"]
+    lines = explained(told)
+    assert lines.missing.endswith(
+        " What is left appears at the ends of load; it rises with pressure."
+    )
+    assert "No other effect" not in lines.sure
+    assert lines.next.endswith("What stands out in addition is shear.")
+    named = diagnosis(misfit_of="shear")
+    assert [mark_of(named, entry) for entry in named["candidates"]] == ["alarm", "quiet"]
+
+
+def test_the_worst_held_out_part_is_named_and_a_useless_effect_is_told_once() -> None:
+    folds = [fold("load", 41.0, 18.0), fold("pressure", 20.0, 9.0)]
+    assert held_out_line(diagnosis(held_out=folds)) == (
+        "On what was held out of the fit it falls from 25.9 to 9.9 (worst: the load 7506 N "
+        "(12 runs), where it falls from 41 to 18)."
+    )
+    same = [fold("cell", 9.0, 9.0)] * 4
+    assert unmoved(diagnosis(heldout_error_after=25.9, held_out=same)) == [
+        "No error on the runs held out fell, in none of 4 parts: 25.9 before, 25.9 after, on "
+        "average."
+    ]
+
+
 def test_effects_that_the_plan_would_mostly_miss_need_other_runs() -> None:
     found, missed = candidate("damping", power=0.9), candidate("shear", power=0.008)
     enough = "No further run is needed for the effects that this plan finds."
@@ -275,8 +304,9 @@ def test_without_a_name_one_error_is_told() -> None:
     assert "In 41 % of plain tires" in told.sure
     assert told.error == (
         "It is 30 times the noise (84.3 microstrain rms, errors of the set points included), 23.5 "
-        "with the model's own numbers fitted anew. All that is left is noise and the structure of "
-        "a tire."
+        "with the model's own numbers fitted anew. What is left (23.5 times the noise, 37.6 "
+        "microstrain) is no more than simulated tires leave; a missing effect of this size cannot "
+        "be excluded."
     )
     assert "No further run" in told.next
     odd = explained(diagnosis(verdict="unknown", named=[], error_after=23.5, floor=23.5, p=0.03))
