@@ -12,6 +12,9 @@ from tirelib.campaign.problem import raise_errors
 from tirelib.campaign.runfile import load_run
 from tirelib.core.errors import FormatError
 
+MEASURED = (".csv", ".tsv", ".txt", ".dat", ".mat", ".parquet", ".tdx", ".tyd", ".tydex")
+"""Suffixes of measured files that an import reads."""
+
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
@@ -87,6 +90,13 @@ def read_campaign(path: str | Path) -> Campaign:
         raise FormatError(
             f"{folder}: no such folder; a campaign is a folder with campaign.toml and runs.csv; "
             "check the path"
+        )
+    raw = [file.name for file in sorted(folder.iterdir()) if file.suffix.lower() in MEASURED]
+    parts = (folder / header_file.FILE, folder / plan_file.FILE)
+    if raw and not any(part.exists() for part in parts):
+        raise FormatError(
+            f"{folder}: holds measured files ({raw[0]}, ...) and no campaign.toml; a campaign is "
+            "needed; make one with `tirelib import`: its --suggest drafts the map"
         )
     header, problems = header_file.parse_header(folder)
     plans, faults = plan_file.parse_plans(folder, header.axes if header else "iso")

@@ -189,7 +189,8 @@ def _say_brush(console: Console, document: dict[str, Any]) -> None:
             entry["unit"],
         )
     console.print(table)
-    where = {"ring": "the ring", "Mz": "Mz", "assumed": "an assumption"}[brush["half_length_from"]]
+    ring = "the ring" if document["parameters"] else "the ring of the given tire"
+    where = {"ring": ring, "Mz": "Mz", "assumed": "an assumption"}[brush["half_length_from"]]
     console.print(
         f"  contact length from {where}; the values hold at the median load, "
         f"{brush['reference']['load_N']:.0f} N"

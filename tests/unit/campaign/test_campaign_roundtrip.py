@@ -303,6 +303,11 @@ def test_a_header_needs_only_name_axes_and_radius(tmp_path: Path) -> None:
 
 
 def test_a_missing_folder_is_named(tmp_path: Path) -> None:
+    (tmp_path / "Messung_01.csv").write_text("")
+    with pytest.raises(
+        FormatError, match=r"Messung_01.csv, \.\.\..*make one with `tirelib import`"
+    ):
+        read_campaign(tmp_path)
     with pytest.raises(FormatError, match="no such folder"):
         read_campaign(tmp_path / "nothing")
 
