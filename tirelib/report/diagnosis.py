@@ -11,7 +11,7 @@ from tirelib.inference.diagnose.document import Assessment
 from tirelib.inference.diagnose.forces.assess import ForceAssessment
 from tirelib.report.comparison import BRUSH, METHOD, RING
 from tirelib.report.error_sentences import fold_name
-from tirelib.report.explanation import STANDS_OUT, mark_of, titled
+from tirelib.report.explanation import STANDS_OUT, mark_of, stands, titled
 from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.figures.force_left import force_maps
 from tirelib.report.figures.strain_left import strain_maps
@@ -22,19 +22,15 @@ from tirelib.report.style import BLUE, FAINT, INK, RED
 
 TITLE = "Which effect is missing"
 METHOD_TEXT = (
-    "Every hypothesis - no effect, one, two and more - is fitted together with the model's own "
-    "numbers. What stands out beside it is compared with what plain tires show, tires of several "
-    "simulators in which nothing is hidden: the standard score of an effect is its likelihood "
-    "ratio in units of theirs, and the threshold is the score that plain tires exceed with the "
-    "false-alarm probability. The p-value of a hypothesis is the share of plain tires with as "
-    "large a score. Every hypothesis with a p-value above the false-alarm probability stays in the "
-    "set, and its smallest members are the verdict. Scores in this table are those beside the "
-    "model as it is; the p-value is that of the hypothesis that this effect is missing and no "
-    "other. Named effects of a force stand in the order of what each alone gains on held-out "
-    "points."
+    "An effect counts only if it explains more of these measurements than of plain tires: tires of "
+    "several simulators in which nothing is hidden. The score is how much better the model fits "
+    "with the effect, in units of what plain tires gain; they exceed the threshold with the "
+    "false-alarm probability. Scores are those beside the model as it is. p is the share of plain "
+    "tires from which as much stands out once this effect, and no other, is added."
 )
+FORCE_TEXT = " Named effects stand in the order of what each alone gains on held-out points."
 LEAST_SHOWN = 0.01
-"""Left end of the logarithmic scale of scores."""
+"""Least score over threshold that has a bar, as its scale is logarithmic."""
 _LEVELS = {"alarm": RED, "hint": BLUE, "quiet": FAINT, STANDS_OUT: INK}
 
 
@@ -88,7 +84,7 @@ def parts_of(
         Part(
             "Candidates",
             "candidates",
-            METHOD_TEXT,
+            METHOD_TEXT + (FORCE_TEXT if isinstance(found, ForceAssessment) else ""),
             tables=[_candidates(told)],
             plots=[_scores(told)] if told["candidates"] else [],
         ),
@@ -156,7 +152,7 @@ def _scores(told: Mapping[str, Any]) -> Plot:
     ratio = [entry["score"] / entry["threshold"] for entry in candidates]
     figure = go.Figure(
         go.Bar(
-            x=np.maximum(np.round(ratio, 4), LEAST_SHOWN),
+            x=[round(each, 4) if each >= LEAST_SHOWN else None for each in ratio],
             y=names,
             orientation="h",
             marker={"color": [_LEVELS[mark] for mark in marks]},
@@ -189,7 +185,7 @@ def _caption(told: Mapping[str, Any], marks: Sequence[str], ratio: Sequence[floa
     """Return what the colors of the scores mean on this page."""
     text = "Orange: alarm; blue: hint; gray: quiet."
     if min(ratio) < LEAST_SHOWN:
-        text += f" The axis begins at {LEAST_SHOWN}; a smaller score is drawn there."
+        text += f" A score below {LEAST_SHOWN} has no bar."
     if STANDS_OUT in marks:
         return f"{text} Black: {STANDS_OUT} beside what is named, where a law does not fit."
     beyond = any(mark == "quiet" and r > 1.0 for mark, r in zip(marks, ratio, strict=True))
@@ -217,7 +213,8 @@ def _errors(told: Mapping[str, Any]) -> Table:
         [
             "largest standard score beside the verdict's model, and the score that plain tires "
             "exceed with the false-alarm probability",
-            f"{number(told['misfit'], 3)} ({told['misfit_of']}); {number(told['misfit_floor'], 3)}",
+            f"{number(told['misfit'], 3)} ({stands(told['misfit_of'])}); "
+            f"{number(told['misfit_floor'], 3)}",
         ],
         *(
             [

@@ -169,15 +169,15 @@ def _by_p(told: Mapping[str, Any]) -> str:
             f"Without {it} the model is rejected (p = {without}{_least(told)}); with {it} nothing "
             f"stands out from what plain tires show (p = {p})."
         )
-    stands = f"{_stands(told['misfit_of'])} stands out from what plain tires show."
+    most = f"{stands(told['misfit_of'])} stands out from what plain tires show."
     if told["verdict"] == "unknown":
         return (
             f"Every hypothesis that was tried is rejected (p = {p} of the likeliest, "
-            f"{level} is needed): {stands}"
+            f"{level} is needed): {most}"
         )
     return (
         f"Without {it} the model is rejected (p = {without}{_least(told)}), and with {it} as well "
-        f"(p = {p}; {level} is needed): {stands}"
+        f"(p = {p}; {level} is needed): {most}"
     )
 
 
@@ -187,7 +187,7 @@ def _least(told: Mapping[str, Any]) -> str:
     return ", the smallest value that the table of plain tires can give" if least else ""
 
 
-def _stands(name: str) -> str:
+def stands(name: str) -> str:
     """Return what has the largest score in words."""
     return f"the law of {name.removeprefix(ROUGHLY)}" if name.startswith(ROUGHLY) else name
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from tirelib.report.error_sentences import error_line, held_out_line, unmoved
-from tirelib.report.explanation import explained, mark_of
+from tirelib.report.explanation import STANDS_OUT, explained, mark_of
 
 
 def candidate(effect: str, **changes: Any) -> dict[str, Any]:
@@ -256,7 +256,7 @@ def test_what_stands_out_beside_the_named_effects_has_a_mark_and_is_told() -> No
     left = {"where": "at the ends of load", "scaling": "rises with pressure"}
     told = diagnosis(verdict="form_inadequate", misfit_of="shear", unexplained=left)
     marks = [mark_of(told, entry) for entry in told["candidates"]]
-    assert marks == ["alarm", "stands out"]
+    assert marks == ["alarm", STANDS_OUT]
     assert [entry["level"] for entry in told["candidates"]] == ["alarm", "quiet"]
     lines = explained(told)
     assert lines.missing.endswith(

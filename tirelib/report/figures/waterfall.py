@@ -61,7 +61,12 @@ def waterfall(
             cliponaxis=False,
         )
     if np.isfinite(floor):
-        figure.add_hline(y=floor, line={"dash": "dot", "color": FAINT}, annotation_text="floor")
+        figure.add_hline(
+            y=floor,
+            line={"dash": "dot", "color": FAINT},
+            annotation_text="floor",
+            annotation_position="top left",
+        )
     figure.update_yaxes(title=f"error [{unit}]", rangemode="tozero")
     figure.update_xaxes(title="effect added (-: removed)")
     styled_figure(figure, 380, barmode="group")
