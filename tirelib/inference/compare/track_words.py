@@ -98,8 +98,8 @@ def _std(track: Track, member: BoolArray) -> float:
 def _say(track: Track, limit: str, mean: float, std: float, runs: int, offset: float) -> str:
     word = WORDS[track.name][0 if mean > 0.0 else 1]
     text = f"{track.name.capitalize()}, {limit}: the model's is "
-    text += f"{_short(track.scale * abs(mean))} \N{PLUS-MINUS SIGN} "
-    text += f"{_short(1.96 * track.scale * std)} {track.unit} too {word} (95 %, {runs} runs)"
+    text += f"{_short(track.scale * abs(mean))} {track.unit} too {word} (95 % "
+    text += f"\N{PLUS-MINUS SIGN} {_short(1.96 * track.scale * std)}, {runs} runs)"
     if track.constant:
         text += (
             f", apart from a constant {_short(track.scale * offset)} {track.unit} in all runs, "
