@@ -1,6 +1,7 @@
 """What options promise: formats, triggers, faults, conditions of a replay, a whole JSON."""
 
 import json
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -85,3 +86,14 @@ def test_the_documented_file_of_conditions_is_read() -> None:
     block = page.split("```json\n")[1].split("```")[0]
     conditions = parse_conditions(json.loads(block), "the page")
     np.testing.assert_allclose(conditions.at(5e6)[:2], (80.0 / 3.6, 2.3e5))
+
+
+def test_the_page_on_ones_own_transmitter_has_a_map_and_a_program_that_are_read() -> None:
+    page = (Path(__file__).parents[2] / "docs/howto/own_calibration.md").read_text("utf-8")
+    program_text = page.split("```python\n")[1].split("```")[0]
+    compile(program_text, "the page", "exec")
+    table = tomllib.loads(page.split("```toml\n")[1].split("```")[0])
+    columns = {channel["column"] for channel in table["channels"].values()}
+    header = page.split("```text\n")[1].splitlines()[0].split(",")
+    assert columns == {"time", *(f"strain_{gage}" for gage in range(1, 6)), *header[1:]}
+    assert "wheel_0_strain_segment" in program_text

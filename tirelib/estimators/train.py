@@ -81,7 +81,8 @@ def train(
         raise CalibrationError(
             f"{observations.headers[0].name}: nothing to calibrate: {reasons}; a campaign needs "
             "what the rig measured beside the strain (channels Fz, Fy, slip_angle, slip_ratio of "
-            "its runs): import both together with `tirelib import`"
+            'its runs): import both together with `tirelib import` (page "Calibrate with your own '
+            'transmitter")'
         )
     chains = {-1: full}
     for missing in range(count):
