@@ -357,8 +357,9 @@ def _recorded(recording: Path | None, source: int | None) -> Iterator[Script]:
 
 
 def _summary(tally: Tally, runs: int, faults: Faults, sink: TerminalSink | BusSink) -> None:
+    where = f" in {runs} runs" if runs else ""
     click.echo(
-        f"{tally.sent} frames in {runs} runs, {tally.unheard} of them sent while no reader "
+        f"{tally.sent} frames{where}, {tally.unheard} of them sent while no reader "
         f"listened, at most {1e3 * tally.late:.1f} ms late"
     )
     for name, count in faults.done.items():

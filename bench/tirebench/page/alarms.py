@@ -123,8 +123,13 @@ def read_alarms(path: Path) -> dict[str, Rule]:
 
 
 def _fault(name: str, table: Any) -> str:
-    if not isinstance(table, dict) or set(table) - {"low", "high", "hysteresis", "off"}:
-        return f"[{name}] has an unknown key; low, high, hysteresis and off are allowed; correct it"
+    if not isinstance(table, dict):
+        return f"{name} = {table!r}; a table [{name}] is needed; write it"
+    if unknown := sorted(set(table) - {"low", "high", "hysteresis", "off"}):
+        return (
+            f"[{name}] has an unknown key, {', '.join(unknown)}; low, high, hysteresis and off are "
+            "allowed; correct it"
+        )
     for key, value in table.items():
         if key == "off":
             good = isinstance(value, bool)
