@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 from tirebench.cli import program
 from tirebench.errors import DeviceError
+from tirebench.page.alarms import read_alarms
 from tirebench.protocols.user_map import read_map
 from tirebench.recording.document import empty_summary
 from tirebench.wire.conditions import Conditions, RunMark, condition, parse_conditions
@@ -97,3 +98,10 @@ def test_the_page_on_ones_own_transmitter_has_a_map_and_a_program_that_are_read(
     header = page.split("```text\n")[1].splitlines()[0].split(",")
     assert columns == {"time", *(f"strain_{gage}" for gage in range(1, 6)), *header[1:]}
     assert "wheel_0_strain_segment" in program_text
+
+
+def test_an_unknown_key_of_an_alarm_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "alarms.toml"
+    file.write_text('format = "tirebench-alarms/1"\n[loss]\nhihg = 2.0\n')
+    with pytest.raises(DeviceError, match=r"\[loss\] has an unknown key, hihg"):
+        read_alarms(file)
