@@ -22,7 +22,7 @@ from tirebench.protocols.user_map import parse_map
 from tirebench.recording.document import turn_document
 from tirebench.recording.export_results import write_mdf
 from tirebench.recording.header import RecordingHeader
-from tirebench.recording.recorder import Recorder
+from tirebench.recording.recorder import Recorder, alarm_event
 from tirebench.recording.recording import Recording
 from tirebench.recording.segments import Segment
 from tirebench.wire.can_batch import joined, pack, same_kind
@@ -63,6 +63,8 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
             arrival = start + 10**7 * (number + 1)
             recorder.estimate(2, arrival, json.dumps(turn_document(turn)).encode())
         recorder.event({"event": "marker", "text": "wet, 50 %"}, start + 10**9)
+        for seconds, on in ((2, True), (3, False)):
+            recorder.event(alarm_event("Fz", "too high", on=on), start + seconds * 10**9)
     return path
 
 
@@ -81,7 +83,9 @@ def check_tables(estimates: pd.DataFrame, events: pd.DataFrame) -> None:
     assert list(estimates.kappa_valid) == [False] * 3
     assert "restarted" in estimates["flags"][1]
     assert [tuple(row) for row in events[["t_s", "event", "text"]].values] == [
-        (1.0, "marker", "wet, 50 %")
+        (1.0, "marker", "wet, 50 %"),
+        (2.0, "alarm begins", "too high"),
+        (3.0, "alarm ends", "too high"),
     ]
 
 

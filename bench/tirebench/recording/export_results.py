@@ -42,6 +42,7 @@ def results(path: Path, wheel: int | None = None) -> tuple[Rows, Rows]:
     """Return estimates and events of a recording, all wheels or one, as columns.
 
     Times: ``utc_s`` on the wall clock when the bytes came, and ``t_s`` since the recording began.
+    An alarm has two events, ``alarm begins`` and ``alarm ends``.
     """
     estimates: Rows = {
         "utc_s": [],
@@ -70,6 +71,8 @@ def results(path: Path, wheel: int | None = None) -> tuple[Rows, Rows]:
                 "utc_s": 1e-9 * (moment + header.clock),
                 "t_s": 1e-9 * (moment - header.monotonic_ns),
             }
+            if is_event and content.get("event") == "alarm":
+                row["event"] = "alarm ends" if content.get("state") == "off" else "alarm begins"
             if not is_event:
                 row |= {"wheel": number, "flags": " ".join(map(str, content.get("flags", [])))}
             for name, column in (events if is_event else estimates).items():
