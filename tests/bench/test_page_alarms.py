@@ -155,6 +155,8 @@ def test_the_page_says_which_conditions_are_in_use_and_where_they_come_from() ->
     assert found["speed"] == {"value": pytest.approx(65.0), "unit": "km/h", "source": "option"}
     assert found["camber"] == {"value": None, "unit": "deg", "source": ""}
     assert "omega" not in found
+    for name in ("friction", "tread_depth", "tread_temperature"):
+        assert found[name]["value"] is None
     wheel.take([Measured("speed", 10.0)], 1)
     found = in_use(wheel, known, "option")
     assert found["speed"] == {"value": pytest.approx(36.0), "unit": "km/h", "source": "bus"}

@@ -39,6 +39,7 @@ class Visit(Visitor):
     numbers: dict[str, dict[str, str]] = field(default_factory=dict)
     counters: dict[str, str] = field(default_factory=dict)
     trace: Any = None
+    scales: Any = None
     lengths: list[str] = field(default_factory=list)
     unplugged: str = ""
     replay: dict[str, Any] = field(default_factory=dict)
@@ -192,6 +193,10 @@ def look(page: Any, seen: Visit) -> None:
             "raw": box.get_attribute("data-value"),
         }
     seen.lengths = page.locator("#shape text[data-gage]").all_text_contents()
+    seen.scales = page.evaluate(
+        "[...document.querySelectorAll('.trace .chart')].map(({ plot: { scales } }) => "
+        "[scales.y.min, scales.y.max])"
+    )
     seen.trace = page.evaluate(
         "[...document.querySelectorAll('.trace .chart')].map(c => c.plot.data.map(d => [...d]))"
     )
@@ -245,6 +250,8 @@ def test_the_large_numbers_are_those_of_the_recording(visit: Visit) -> None:
 
 def test_five_traces_lie_over_wheel_angle_with_their_band(visit: Visit) -> None:
     assert len(visit.trace) == 5
+    assert visit.scales == visit.scales[:1] * 5  # a dead gage is seen to be flat
+    assert visit.scales[0][1] > 100.0
     for angle, high, low, strain in visit.trace:
         np.testing.assert_allclose(angle, GRID)
         top, bottom, line = (np.array(x, dtype=float) for x in (high, low, strain))

@@ -100,7 +100,9 @@ def test_all_wheels_alarms_what_is_in_use_and_the_zero_of_the_gages(
         assert use == {
             "speed": "64.8 km/h bus",
             "pressure": "2.30 bar option",
-            "camber": "not known",
+            **dict.fromkeys(
+                ("camber", "friction", "tread_depth", "tread_temperature"), "not known"
+            ),
             "recording": "a.mcap 2.5 MB, 3.0 min",
             "room": "400.0 MB free for 5.0 min",
         }

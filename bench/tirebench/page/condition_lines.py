@@ -1,4 +1,4 @@
-"""Which speed, pressure and camber are in use for a wheel, and where each comes from."""
+"""Which conditions are in use for a wheel, and where each comes from."""
 
 import math
 from typing import Any
@@ -8,7 +8,7 @@ from tirebench.wire.conditions import UNITS, Conditions
 from tirelib.core.held import HELD
 from tirelib.core.units import from_si
 
-ALWAYS = ("speed", "pressure", "camber")
+ALWAYS = tuple(name for name in HELD if name != "omega")
 """Shown also where they are not known."""
 
 

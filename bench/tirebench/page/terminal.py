@@ -173,7 +173,7 @@ def _wheel(
     lines = Table(box=None, show_header=False, padding=(0, 1))
     for gage, trace in enumerate(wheel.laps[-1] if wheel.laps and traces else (), 1):
         lines.add_row(f"gage {gage}", sparkline(trace))
-    title = f"wheel {number}, turn {entry['turn']}, t = {entry['device_time']:.2f} s"
+    title = f"wheel {number}, turn {entry['turn']}, t = {entry['device_time']:.2f} s, ± 95 %"
     return Panel(Columns([table, lines]), title=title, title_align="left")
 
 

@@ -37,7 +37,7 @@ export function buildAll(place, numbers, choose) {
   place.dataset.count = numbers.length;
   for (const chart of place.querySelectorAll(".chart")) {
     const { least, sign, unit } = QUANTITIES.find(({ key }) => key === chart.dataset.key);
-    timeChart(chart, least, `${sign}, ${unit}`, 18);
+    timeChart(chart, least, `${sign}, ${unit}; ± 95 %`, 18);
   }
 }
 

@@ -126,12 +126,22 @@ const count = { draw: [() => { drawn.count += 1; }] };
 const hooks = (shape) => ({ ...count, drawAxes: [(plot) => filled(plot, shape)] });
 const invisible = { paths: () => null, points: { show: false } };
 
+// One scale for all gages: beside the others a dead one is seen to be flat.
+const common = steady(20);
+let together = [-20, 20];
+export function shareScale(plots) {
+  const known = plots.flatMap(({ data }) => data.slice(1).flat()).filter((y) => y !== null);
+  const ends = known.reduce(([low, high], y) => [Math.min(low, y), Math.max(high, y)], [Infinity, -Infinity]);
+  together = known.length ? common(null, ...ends) : together;
+  for (const plot of plots) plot.setData(plot.data);
+}
+
 export function traceChart(place, last) {
   const plot = new uPlot({
     width: 300, height: 80, legend: { show: false }, hooks: hooks(alongAngle),
     cursor: { sync: { key: "angle" }, points: { show: false }, drag: { setScale: false } },
     padding: [4, 18, last ? 0 : 4, 0],
-    scales: { x: { time: false, range: () => [-180, 180] }, y: { range: steady(20) } },
+    scales: { x: { time: false, range: () => [-180, 180] }, y: { range: () => together } },
     axes: [
       axis({ show: last, size: 24, splits: () => place.zoomed
         ? [-40, -20, 0, 20, 40] : [-180, -135, -90, -45, 0, 45, 90, 135, 180],

@@ -1,6 +1,6 @@
 // The page of `tirebench run`: takes messages from the stream, draws at most once a frame.
 import { buildAll, drawAll } from "./all.js";
-import { drawn, readColors, timeChart, traceChart } from "./charts.js";
+import { drawn, readColors, shareScale, timeChart, traceChart } from "./charts.js";
 import {
   clock, limits, newest, node, QUANTITIES, reasons, scaled, series, shown, WIDTH,
 } from "./format.js";
@@ -218,12 +218,14 @@ function drawLap() {
   $("lap").textContent = mine
     ? `µε, turn ${lap.turn}${lap.valid ? "" : " (invalid)"}; band of ${lap.laps} turns`
     : "waiting for a whole turn";
-  const none = new Array(720).fill(null);
+  const [none, charts] = [new Array(720).fill(null), []];
   document.querySelectorAll(".trace .chart").forEach(({ plot }, gage) => {
     const high = mine && band ? column(band, 3600 + 720 * gage) : none;
     const low = mine && band ? column(band, 720 * gage) : none;
-    plot.setData([ANGLES, high, low, mine ? column(lap.data, 720 * gage) : none]);
+    plot.setData([ANGLES, high, low, mine ? column(lap.data, 720 * gage) : none], false);
+    charts.push(plot);
   });
+  shareScale(charts);
 }
 
 function status() {
@@ -425,7 +427,7 @@ function build() {
     top.className = "top";
     const left = node("div", sign);
     left.className = "name";
-    left.append(node("small", name), node("small", "ISO 8855"));
+    left.append(node("small", `${name}, ± 95 %`), node("small", "ISO 8855"));
     const value = node("div", "–");
     value.className = "value";
     const right = document.createElement("div");
