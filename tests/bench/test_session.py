@@ -3,16 +3,21 @@
 import time
 from collections.abc import Sequence
 
+import numpy as np
 import pytest
 
 from tests.bench.campaigns import tiny_runs
 from tests.bench.clocks import Clock
 from tests.bench.in_process import InProcess
+from tests.bench.test_page import block
+from tests.bench.test_page import turn as made_turn
 from tirebench.deadline import Deadline
 from tirebench.emulator.emulator import write_script
 from tirebench.emulator.faults import Faults
 from tirebench.estimator.chain import Outputs, Turn
+from tirebench.estimator.estimation import News, WheelEstimation
 from tirebench.estimator.session import Limits, Session
+from tirebench.estimator.wheels import Block
 from tirebench.links import Read
 from tirebench.recording.replay import ReplayChain
 from tirebench.wire.conditions import Condition, Conditions
@@ -110,6 +115,19 @@ def test_stop_ends_in_good_order(wire: list[bytes]) -> None:
     seen: list[Turn] = []
     running = session(wire, watch=lambda news: (seen.extend(news.turns), running.stop())[0])
     assert running.run().reason == "stopped"
+
+
+def test_turns_whose_load_may_be_used_are_counted() -> None:
+    running = session([])
+    running._note(News([made_turn(1, valid=0.0, Fz_valid=1.0), made_turn(2, valid=0.0)]))
+    assert (running.outcome.count, running.outcome.valid, running.outcome.with_load) == (2, 0, 1)
+
+
+def test_what_the_gages_show_is_passed_on_where_nobody_looks_and_nothing_turns() -> None:
+    estimation = WheelEstimation(Counter(), Conditions.constant(), laps=False)
+    news = estimation.take(Block(0, 0, 0, block(0, np.zeros((2500, 5)))))
+    assert (len(news.levels), len(news.turns)) == (1, 0)
+    assert news
 
 
 def test_a_pass_of_a_loop_goes_on_in_time_and_number() -> None:

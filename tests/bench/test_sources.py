@@ -8,7 +8,6 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from tests.bench.in_process import FakeSource
 from tests.bench.programs import PATIENCE
 from tests.bench.servers import Server
 from tests.bench.sources import VEHICLE, serial, told, vehicle, wire
+from tests.bench.test_page import turn as made_turn
 from tests.bench.test_processes import Turns
 from tirebench.cli import program
 from tirebench.cli.run_inputs import given_replayed
@@ -301,7 +301,7 @@ def test_a_source_that_is_given_up_is_an_alarm_and_the_other_goes_on(tmp_path: P
 
 def test_an_error_after_the_first_turn_is_raised_when_all_is_written() -> None:
     source: Any = FakeSource(0)
-    turn: Any = SimpleNamespace(wheel=0, valid=True, arrival=1)
+    turn = made_turn(1)
     coming = iter([News([turn])])
 
     def poll(_: Deadline) -> News:

@@ -1,5 +1,6 @@
 """What a run says and waits for before its first frame."""
 
+import io
 import signal
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,7 +16,13 @@ from tests.bench.programs import A_TURN, PATIENCE
 from tests.bench.sources import serial, vehicle
 from tests.bench.test_user_line import THREE, plan_of
 from tirebench.cli import program
-from tirebench.cli.run_inputs import RunInputs, conditions_of, port_of_file, say_missing
+from tirebench.cli.run_inputs import (
+    RunInputs,
+    conditions_of,
+    port_of_file,
+    say_missing,
+    wait_for_file,
+)
 from tirebench.deadline import Deadline
 from tirebench.errors import DeviceError, LinkError, UnpluggedError
 from tirebench.estimator.chain import Outputs
@@ -117,6 +124,34 @@ def test_a_port_file_is_waited_for_and_so_is_its_port(
         with pytest.raises(DeviceError, match=r"its port .*pts is not there; .* --wait"):
             port_of_file(file, 60.0, quiet)
         assert clock.now > 60.0
+
+
+def test_a_file_of_conditions_is_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock, file = Clock(), tmp_path / "c.json"
+    steps = iter([lambda: None, lambda: file.write_text("{}")])
+
+    def sleep(seconds: float) -> None:
+        clock.now += seconds
+        next(steps, lambda: None)()
+
+    with monkeypatch.context() as patch:
+        for module in ("tirebench.cli.run_inputs", "tirebench.deadline"):
+            patch.setattr(f"{module}.time", clock)
+        patch.setattr(clock, "sleep", sleep)
+        console = Console(record=True, file=io.StringIO(), width=200)
+        begun = clock.now
+        wait_for_file(file, 60.0, console)
+        assert file.exists()
+        assert clock.now < begun + 1.0
+        assert "waiting for" in console.export_text()
+        file.unlink()
+        begun = clock.now
+        wait_for_file(file, 0.0, console)  # none without --wait
+        assert clock.now == begun
+        wait_for_file(file, 60.0, console)
+        assert clock.now > begun + 60.0
 
 
 class Absent:

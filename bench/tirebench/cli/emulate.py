@@ -247,7 +247,10 @@ def emulate(
     ready = list(player.pieces(tape)) if tape is not None and short else []
     with closing(sink), ExitStack() as stack:
         if sidecar is not None and tape is not None:
-            write_json(sidecar, _sidecar(tape, loop))
+            from tirebench.recording.new_file import whole
+
+            with whole(sidecar) as new:  # whoever waits for it reads all of it
+                write_json(new, _sidecar(tape, loop))
         click.echo(sink.path)
         if port_file is not None:
             _announce(port_file, sink.path)

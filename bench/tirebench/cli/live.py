@@ -23,7 +23,10 @@ ROWS = 20
 REFRESH = 0.25
 """Time between two drawings, [s]."""
 FORMATS = {"Fz": (".0f", "N"), "alpha": (".2f", "deg"), "kappa": (".4f", ""), "Fy": (".0f", "N")}
-UNITS = [f"{name} [{unit}]" if unit else name for name, (_, unit) in FORMATS.items()]
+UNITS = [
+    f"{name} [{unit}] ± std" if unit else f"{name} ± std" for name, (_, unit) in FORMATS.items()
+]
+LEGEND = "± std: one standard deviation; ?: this quantity is not valid"
 HEADINGS = ("wheel", "run", "t [s]", *UNITS, "valid", "flags")
 LOSSES = (
     "crc_bad",
@@ -48,19 +51,24 @@ class Screen:
     console : Console
     source : Source
         Whose counters are shown.
+    patience : float, [s]
+        So long a port that is lost is tried again.
     """
 
-    def __init__(self, console: Console, source: Source) -> None:
+    def __init__(self, console: Console, source: Source, patience: float = 0.0) -> None:
         self._console = console
         self._source = source
         self._turns: deque[Turn] = deque(maxlen=ROWS)
         self._live = Live(console=console, auto_refresh=False) if console.is_terminal else None
         self._drawn = 0.0
+        self._patience = patience
+        self._lost: float | None = None
 
     def __enter__(self) -> "Screen":
         if self._live is not None:
             self._live.start()
         else:
+            self._console.print(LEGEND, soft_wrap=True, markup=False)
             self._console.print(_plain_row(HEADINGS), soft_wrap=True, markup=False)
         return self
 
@@ -80,6 +88,7 @@ class Screen:
             self._console.print(f"FMU: {said}", soft_wrap=True, markup=False)
         for said in news.alarms:
             self._console.print(f"ALARM: {said}", style="bold red", soft_wrap=True, markup=False)
+        self._port()
         self._turns.extend(news.turns)
         if self._live is None:
             rows = [_plain_row(_cells(turn)) for turn in news.turns]
@@ -89,8 +98,19 @@ class Screen:
             self._live.update(self._table(), refresh=True)
             self._drawn = time.monotonic()
 
+    def _port(self) -> None:
+        """Say when the port goes away and when it is back."""
+        lost, was = self._source.lost, self._lost
+        if lost is not None and was is None:
+            self._console.print(
+                f"port lost, tried again for {self._patience:g} s", style="bold red"
+            )
+        elif lost is None and was is not None:
+            self._console.print(f"back after {time.time() - was:.1f} s")
+        self._lost = lost
+
     def _table(self) -> RenderableType:
-        table = Table(box=SIMPLE_HEAD, title=self._source.name)
+        table = Table(box=SIMPLE_HEAD, title=self._source.name, caption=LEGEND)
         for heading in HEADINGS:
             table.add_column(Text(heading), justify="left" if heading == "flags" else "right")
         for turn in self._turns:
@@ -124,10 +144,10 @@ def _cells(turn: Turn) -> tuple[str, ...]:
         std = turn.outputs.get(f"{name}_std", math.nan) * factor
         spec = FORMATS[name][0]
         mark = "" if quantity_valid(turn, name) else "?"
-        cells.append("-" if math.isnan(value) else f"{value:{spec}} +-{std:{spec}}{mark}")
+        cells.append("-" if math.isnan(value) else f"{value:{spec}} ± {std:{spec}}{mark}")
     return (*cells, "yes" if turn.valid else "no", " ".join(flags(turn)))
 
 
 def _plain_row(cells: Sequence[str]) -> str:
-    widths = (5, 4, 9, 15, 15, 17, 15, 5, 0)
+    widths = (5, 4, 9, 15, 17, 18, 15, 5, 0)
     return "  ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))

@@ -32,10 +32,12 @@ from tirebench.cli.run_inputs import (
     port_of_file,
     refuse_line_options,
     say_missing,
+    wait_for_file,
 )
 from tirebench.cli.start_checks import check_conditions, say_slow
 from tirebench.cli.stop import start_in_order
 from tirebench.estimator.chain import Estimator
+from tirebench.estimator.dead_gages import DeadGages
 from tirebench.estimator.estimation import Estimation, News
 from tirebench.estimator.fmu_archive import read_fmu
 from tirebench.estimator.fmu_model import FmuFile, FmuModel
@@ -99,7 +101,7 @@ the run in good order.
     default=0.0,
     is_flag=False,
     flag_value=60.0,
-    help="Wait for ports that do not exist yet, 60 s unless a time is given.",
+    help="Wait for ports and a conditions file that do not exist yet, 60 s unless a time is given.",
 )
 @click.option("--replay", metavar="FILE", type=FILE, help="Recording to read instead of a port.")
 @pace_option
@@ -241,6 +243,8 @@ def run(
     elif wait and replay is None:
         console.print(f"waiting up to {wait:g} s for ports that do not exist yet")
     options = {"speed": speed, "pressure": pressure, "camber": camber}
+    if sidecar is not None:
+        wait_for_file(sidecar, wait, console)
     conditions = conditions_of(options, named, sidecar)
     console.print(f"FMU {fmu_file}, sha256 {archive.sha256}", soft_wrap=True)
     console.print(f"FMU {check_trust(archive, trust=trust)}", soft_wrap=True)
@@ -333,8 +337,10 @@ def run(
         limits = Limits(duration, silence, turns)
         session = Session(source, limits=limits, keep=json_file is not None)
         stop.action = session.stop
-        outcome, used = _session(session, source, console, bridges, shown, journal, switch)
-        _summary(console, outcome, source, used, link, switch)
+        dead = DeadGages(() if calibration is None else calibration.lateral)
+        screen = None if shown.quiet else Screen(console, source, reconnect)
+        outcome, used = _session(session, source, screen, dead, bridges, shown, journal, switch)
+        _summary(console, outcome, source, dead, used, link, switch)
         if journal is not None:
             origin = {
                 "link": source.name,
@@ -342,6 +348,7 @@ def run(
                 "ended": outcome.reason,
                 "cpu_share": used if source.live else None,
                 "chain": source.counts(),
+                "dead_gages": dead.said,
             }
             journal.finish(
                 document(outcome.turns, known.conditions.runs, source.wheels, origin, calibration)
@@ -369,7 +376,8 @@ def _in_process(
 def _session(
     session: Session,
     source: Source,
-    console: Console,
+    screen: Screen | None,
+    dead: DeadGages,
     bridges: Bridges,
     shown: Shown,
     journal: Journal | None,
@@ -377,12 +385,13 @@ def _session(
 ) -> tuple[Outcome, float]:
     """Run until something ends it; return the outcome and the share of a core that it used."""
     with ExitStack() as stack:
-        screen = None if shown.quiet else stack.enter_context(Screen(console, source))
-
+        if screen is not None:
+            stack.enter_context(screen)
         said = ""
 
         def watch(news: News) -> None:
             nonlocal said
+            news.alarms += dead.take(news.levels)
             if journal is not None:
                 journal.add(news.turns)
                 if journal.error != said:
@@ -414,6 +423,7 @@ def _summary(
     console: Console,
     outcome: Outcome,
     source: Source,
+    dead: DeadGages,
     used: float,
     link: ReplayLink | None,
     switch: RecordingSwitch | None,
@@ -422,10 +432,13 @@ def _summary(
     if outcome.message:
         console.print(f"unplugged: {outcome.message}", soft_wrap=True, markup=False)
     console.print(
-        f"ended: {outcome.reason}; {outcome.count} turns, {outcome.valid} valid (ISO 8855 axes); "
+        f"ended: {outcome.reason}; {outcome.count} turns, {outcome.valid} complete, Fz valid in "
+        f"{outcome.with_load} of {outcome.count} (ISO 8855 axes); "
         f"{counters(source.wheels, live=source.live)}",
         soft_wrap=True,
     )
+    for text in dead.said:
+        console.print(text, soft_wrap=True, markup=False)
     if link is not None and link.recording.complete is False:
         console.print(
             f"note: the recording is incomplete ({link.recording.damage})", soft_wrap=True

@@ -144,6 +144,15 @@ def port_of_file(file: Path, wait: float, console: Console) -> str:
         time.sleep(LOOK)
 
 
+def wait_for_file(file: Path, wait: float, console: Console) -> None:
+    """Wait until a file exists, at most so long [s]."""
+    deadline = Deadline.after(wait)
+    if wait and not file.exists():
+        console.print(f"waiting for {file}", soft_wrap=True, markup=False)
+    while not (file.exists() or deadline.expired):
+        time.sleep(LOOK)
+
+
 def conditions_of(
     options: Mapping[str, float | None], named: Sequence[str], sidecar: Path | None
 ) -> Conditions | None:

@@ -48,7 +48,13 @@ class News:
 
     def __bool__(self) -> bool:
         return bool(
-            self.turns or self.laps or self.messages or self.alarms or self.jumps or self.left_out
+            self.turns
+            or self.laps
+            or self.messages
+            or self.alarms
+            or self.jumps
+            or self.levels
+            or self.left_out
         )
 
     def add(self, other: "News") -> None:
@@ -109,7 +115,7 @@ class WheelEstimation:
                 self._laps = self._laps or Laps(block.wheel)
                 self._laps.samples(content)
         news = self._news(self._chain.take(block))
-        if self._looked_at and isinstance(content, Samples):
+        if isinstance(content, Samples):
             self._levels = self._levels or Levels(block.wheel)
             news.levels = self._levels.take(content)
         if live and news.laps and time.monotonic_ns() - block.arrival > 1e9 * LONGEST_WAIT_FOR_LAPS:

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from tirebench.deadline import Deadline
 from tirebench.errors import BenchError
-from tirebench.estimator.chain import Turn
+from tirebench.estimator.chain import Turn, quantity_valid
 from tirebench.estimator.estimation import News
 from tirebench.estimator.wheels import Wheels
 
@@ -103,8 +103,8 @@ class Outcome:
         ``end`` (of a recording), ``duration``, ``silence``, ``turns``, ``stopped``, ``unplugged``.
     message : str
         Message of the port that went away.
-    count, valid : int
-        Turns so far, and those that may be used.
+    count, valid, with_load : int
+        Turns so far, those that may be used as a whole, and those whose Fz may be used.
     turns : list of Turn
         In the order in which their bytes came; empty unless they are to be kept.
     error : BenchError or None
@@ -117,6 +117,7 @@ class Outcome:
     message: str = ""
     count: int = 0
     valid: int = 0
+    with_load: int = 0
     turns: list[Turn] = field(default_factory=list)
     error: BenchError | None = None
     latency: deque[float] = field(default_factory=lambda: deque(maxlen=10_000))
@@ -195,6 +196,7 @@ class Session:
     def _note(self, news: News) -> None:
         self.outcome.count += len(news.turns)
         self.outcome.valid += sum(turn.valid for turn in news.turns)
+        self.outcome.with_load += sum(quantity_valid(turn, "Fz") for turn in news.turns)
         self.outcome.latency.extend(news.latency)
         if self._keep:
             self.outcome.turns.extend(news.turns)
