@@ -40,7 +40,7 @@ class Folder:
 def use(patch: pytest.MonkeyPatch, measured: Waveforms) -> None:
     for verb in ("diagnose", "add"):
         patch.setattr(f"tirelib.cli.{verb}.read_campaign", lambda path: Folder(measured))
-    for module in ("waveforms", "extend.additions"):
+    for module in ("measured.waveforms", "inference.extend.additions"):
         patch.setattr(f"tirelib.{module}.measure_waveforms", lambda c, progress: c.measured)
 
 
