@@ -250,7 +250,7 @@ def test_a_condition_that_cannot_be_is_named_and_what_depends_on_it_is_not_valid
     assert len(seen) > 1
     name = note.removesuffix("_out_of_range")
     (said,) = ten.messages
-    assert said.startswith(f"{note}: {name} [")
+    assert said.startswith(f"{note}: {'gauge pressure' if name == 'pressure' else name} [")
     assert f"= {abs(known[name]) if name == 'speed' else known[name]:g}; the calibration" in said
     assert not any(v["valid"] for v in seen)
     for values in seen:

@@ -68,7 +68,7 @@ def renamed(source: str, package: str) -> str:
     Examples
     --------
     >>> renamed("from tirelib.core.errors import TirelibError", "tirelib_0")
-    'from tirelib_0.errors import TirelibError'
+    'from tirelib_0.core.errors import TirelibError'
     """
     return _BROUGHT.sub(rf"\g<1>{package}.\g<2>", _IMPORT.sub(rf"\g<1>{package}", source))
 
