@@ -30,7 +30,7 @@ GEOMETRY = {
     "belt_width": 0.168,
     "innerliner_offset": -0.003,
 }
-"""Of the numerical rig's tire, from which the surfaces are made, [m]."""
+"""Dimensions of the numerical rig's tire, from which the surfaces are made, [m]."""
 TURNS = 5.1
 LOAD_SETTING, GAIN_REPEATABILITY = 0.005, 0.003
 """How far the load is from its set point, and the gain of a gage from that of another run, [1]."""

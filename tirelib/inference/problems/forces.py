@@ -68,11 +68,11 @@ class ForceSolved:
     rest : shape (n,), [N] or [N m]
         Measured less model.
     force : shape (n,)
-        Of the model.
+        The model's force.
     state : BrushState
         With the effects.
     turn : shape (n,), [rad]
-        Of the contact on its carcass.
+        Angle by which the contact turns on its carcass.
     """
 
     rest: FloatArray
@@ -93,7 +93,7 @@ class ForceProblem:
         Constants of the model's brush, SI.
     catalogue : sequence of Effect
     noise : float, [N] or [N m]
-        Of a point, from repeats; NaN without.
+        Standard deviation of a point's noise, from repeats; NaN without.
     effects, strengths
         That the model has already.
     """
@@ -149,7 +149,7 @@ class ForceProblem:
         Parameters
         ----------
         bench : ForceBench
-            Of the present points and those ahead.
+            The present points and those ahead.
         repeats : shape (n_ahead,)
             Measurements of which each is the mean: noise and set points average, the misfit that a
             block has for itself does not.

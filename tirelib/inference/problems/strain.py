@@ -87,7 +87,7 @@ class StrainSolved:
     model : Solution
     delay : float, [s]
     waveform : shape (n_runs, n_phi)
-        Of the model, with the delay.
+        The model's waveforms, with the delay.
     """
 
     rest: FloatArray
@@ -112,7 +112,7 @@ class Reference:
     tangent : shape (n_runs, n_phi, 4)
         Its slopes by load, pressure, gain and angle.
     half_angle : shape (n_runs,), [rad]
-        Of the contact.
+        Half of the contact's angle.
     point : Point
     rolling : Rolling
         A start of solutions nearby.
@@ -167,7 +167,7 @@ class StrainProblem:
     ----------
     runs : StraightRuns
     values : mapping
-        Of the model's tire.
+        Values of the model's tire.
     catalogue : sequence of Effect
     effects, strengths
         That the model has already.

@@ -51,7 +51,7 @@ def law_errors(
     rows : shape (components, n_runs, n_phi), [-]
         What the effect does to the waveforms.
     half_angle : shape (n_runs,), [rad]
-        Of the contact.
+        Half of the contact's angle.
     points : Operating
     present : int
         Runs that are measured, the first ones: conditions count from their mean.

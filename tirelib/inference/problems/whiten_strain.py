@@ -76,7 +76,7 @@ class Whitener:
         scale : shape (n_runs, 4)
             Their standard deviations.
         half_angle : shape (n_runs,), [rad]
-            Of the contact.
+            Half of the contact's angle.
         points : Operating
         low_pass : LowPass
         noise : float or shape (n_runs,), [-]

@@ -40,7 +40,7 @@ class Hypothesis:
     ----------
     fit : Posterior
     nulls : tuple of Null
-        Of every family.
+        The test by every family.
     plain : tuple of shape (n_tires,)
         Statistic of each plain tire by the families other than its own, by family.
     laws : tuple of float

@@ -78,7 +78,7 @@ def next_runs(
     alpha : float
         False-alarm probability.
     seed : int
-        Of the draws, which all runs share.
+        Seed of the draws, which all runs share.
     """
     forecasts = [_Forecast(ahead, rival) for rival in rivals]
     out = []
@@ -118,7 +118,7 @@ class _Forecast:
     Attributes
     ----------
     rows : shape (m, ...)
-        Of everything that may explain a residual, in all runs.
+        Signatures of everything that may explain a residual, in all runs.
     start : shape (...)
         The model with all coefficients of the rows at zero.
     """

@@ -30,13 +30,13 @@ class Normal:
     Attributes
     ----------
     blocks : mapping of name to slice
-        Of the rows.
+        Where the rows of each block stand.
     gram : shape (m, m)
     right : shape (m,)
     square : float
         Sum of squares of the residual.
     count : int
-        Of its samples.
+        How many samples it has.
     mean : shape (m,)
         Coefficients that have been taken off the residual.
     """

@@ -92,7 +92,7 @@ class Null:
     Attributes
     ----------
     names : list of str
-        Of everything that may be there in addition to the hypothesis.
+        Everything that may be there in addition to the hypothesis.
     counts : shape (n_names,)
         Components n_j of each.
     usual : (shape (n_names,), shape (n_names,))

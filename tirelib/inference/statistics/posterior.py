@@ -72,7 +72,7 @@ class Posterior:
     widths : shape (n_coordinates,)
         Prior standard deviations of the block "base".
     covariance : shape (n_coordinates, n_coordinates)
-        Of its coordinates.
+        Covariance of the block's coordinates.
     cost : float
         J at the point.
     far : bool

@@ -66,7 +66,7 @@ def strain(z: FloatArray, k: Constants, gage: Gage, size: tuple[int, int], n: in
     k : Constants
     gage : Gage
     size : (fine, coarse)
-        Of the mesh.
+        Numbers of elements in the mesh.
     """
     turned = belt.shear_angle(z, k) if gage.liner.any() else None
     return _on_turn(belt.strain(z, k, gage.offset), turned, k, gage, size, n)

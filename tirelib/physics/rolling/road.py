@@ -54,7 +54,7 @@ class Tip:
     down, along : [m]
         Y downwards from the axle and X along the road's motion.
     arm : [m]
-        Of the road's shear about the axle: Y less what the tread has grown thicker.
+        Lever of the road's shear about the axle: Y less what the tread has grown thicker.
     by_down, by_along : tuple of four
     lever_down, lever_along : [m]
         Minus the second derivatives by psi.
