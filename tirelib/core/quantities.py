@@ -17,7 +17,7 @@ class Quantity(NamedTuple):
     ----------
     title : str
     dimension : str
-        As in `tirelib.core.units`.
+        Name of the dimension in `tirelib.core.units`.
     unit : str
         Engineer's unit; 1 for a ratio.
     signed : bool

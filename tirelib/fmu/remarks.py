@@ -50,7 +50,7 @@ line of the bench's page."""
 
 
 MOST_STRAIN = 1.0
-"""No gage shows more: the limit of the inputs in the model description."""
+"""Largest strain of a frame, [1], which the model description states as the limit of the inputs."""
 
 
 @dataclass(frozen=True, slots=True)

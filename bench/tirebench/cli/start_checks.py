@@ -45,7 +45,8 @@ def check_conditions(given: Conditions, calibration: Calibration) -> None:
     Raises
     ------
     DeviceError
-        With every such condition, in the units of the options.
+        If a condition is beyond what the calibration allows; the text lists each in the unit of
+        its option.
     """
     if faults := list(_beyond(given, calibration)):
         raise DeviceError(faults)

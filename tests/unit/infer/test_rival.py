@@ -110,3 +110,15 @@ def test_a_rival_out_of_its_range_puts_nothing_out(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(Hypotheses, "_tested", outside)
     assert select(planted("bend", 3), FAMILIES).sets == (("twist",),)
+
+
+def test_only_the_laws_that_plain_tires_are_weighed_by_count_against_a_hypothesis() -> None:
+    """A rival that another law makes likelier gains nothing on the runs by the law it stays with."""
+    toy = Toy(drawn(np.random.default_rng(4)), alike=True)
+    toy.measured = toy.measured + 0.6 * toy.by["twist"][0]
+    among = Hypotheses(toy, FAMILIES)
+    one, other = among.at(["twist"]), among.at(["bend"])
+    assert one is not None
+    assert other is not None
+    likelier = replace(other, likelihood=other.likelihood + 60.0)
+    assert p_against(toy, one, likelier) > 0.2

@@ -10,7 +10,7 @@ import pytest
 from tests.unit.infer.linear_problem import SHAPES, N, Solved, Toy, drawn, family
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
-from tirelib.inference.statistics.hypothesis import Hypothesis, judged
+from tirelib.inference.statistics.hypothesis import LAWS, Hypothesis, judged
 from tirelib.inference.statistics.posterior import Posterior, posterior
 from tirelib.inference.statistics.problem import Point
 from tirelib.inference.statistics.select import Hypotheses, _apart, _further, select
@@ -151,6 +151,36 @@ def test_a_small_part_of_a_strong_effect_that_looks_like_another_gets_no_name(
     toy.lookalike = share
     found = select(toy, FAMILIES)
     assert {frozenset(names) for names in found.sets} == {frozenset(named)}
+
+
+class Uneven(Toy):
+    """Two strong effects, each with errors of its own law that look like nothing else."""
+
+    def __init__(self, measured: FloatArray) -> None:
+        super().__init__(measured)
+        random = np.random.default_rng(41)
+        self.by = {name: 10.0 * rows for name, rows in self.by.items()}
+        self.ways = {name: random.standard_normal((8, N)) for name in self.by}
+
+    def roughly(
+        self, point: Point, solved: Any, slopes: FloatArray, count: int
+    ) -> list[FloatArray]:
+        effects = point.effects[:count]
+        sizes = [float(np.linalg.norm(size)) for size in point.ranges[:count]]
+        return [10.0 * size * self.ways[e.name] for e, size in zip(effects, sizes, strict=True)]
+
+
+def test_every_law_is_off_by_its_own_share() -> None:
+    """One that is not right leaves the error of one that is right small."""
+    random = np.random.default_rng(7)
+    toy = Uneven(drawn(random))
+    done = toy.by["bend"][0] + toy.by["twist"][0]
+    toy.measured = toy.measured + done + 3.0 * random.standard_normal(8) @ toy.ways["bend"]
+    both = Hypotheses(toy, FAMILIES).at(["bend", "twist"])
+    assert both is not None
+    bend, twist = both.laws
+    assert bend >= 0.1
+    assert twist == LAWS[0]
 
 
 def test_a_law_that_is_a_definition_has_no_error() -> None:

@@ -9,7 +9,9 @@ from scipy.stats import qmc
 from tirelib.core.arrays import FloatArray
 
 POINTS, SEED = 150, 3
+"""Conditions of a plan, and the seed of its sequence."""
 LOAD = (900.0, 7400.0)
+"""Smallest and largest load [N]."""
 ALPHA, KAPPA, CAMBER = math.radians(5.8), 0.115, math.radians(3.7)
 """Largest slip angle [rad], braking slip ratio [1] and camber [rad]."""
 USUAL = 0.07
@@ -17,6 +19,7 @@ USUAL = 0.07
 LIGHT, LIGHTEST = 40, 1900.0
 """Points of the plan of wheels inside a turn, and their largest load [N]."""
 DRIVING = 0.015
+"""Largest driving slip ratio [1]."""
 SPEED = (8.0, 30.0)
 PRESSURE = 2.3e5
 FREE, STRAIGHT = 0.35, 0.2

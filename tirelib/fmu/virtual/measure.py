@@ -54,9 +54,9 @@ def measure(
     ----------
     surface : Surface
     folder : path
-        The campaign's.
+        Where the campaign is written.
     conditions : array, shape (n, 5), optional
-        As those of `drive`, which are the default: what a car's wheels do.
+        Conditions in the columns of `drive`; by default those that the wheels of a car meet.
     seed : int
         The day: noise, loads and gains.
     overwrite : bool

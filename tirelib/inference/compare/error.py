@@ -10,7 +10,7 @@ a model without any fault has the error 1.
 The unit is the noise of a run's mean waveform. It comes from the data alone: from repeats at equal
 set points, beside what the campaign's own slopes by load, pressure, gain and angle explain of their
 differences (`tirelib.inference.identify.noise`). A model does not change it. Without repeats the
-unit is microstrain, and the error is the rms of what is left beside the delay.
+unit is microstrain, and the error is the rms residual after the delay has been fitted.
 """
 
 from collections.abc import Mapping

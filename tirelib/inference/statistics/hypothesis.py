@@ -137,7 +137,7 @@ def judged(
         How many of the fit's effects the model had already: they are part of it.
     """
     views = [fit.view(problem, own) for own in OWN]
-    alike = [_each(fit, law) for law in (LAWS if _vague(fit) else (USUAL,))]
+    alike = list(dict.fromkeys(_each(fit, law) for law in LAWS))
     found = {laws: _likeliest(views, fit, families, laws) for laws in alike}
     laws = max(alike, key=lambda laws: found[laws][0])
     for k in _vague(fit) if len(fit.effects) > 1 else ():
@@ -145,16 +145,16 @@ def judged(
         near = found[laws][1:]
         found |= {m: _likeliest(near, fit, families, m) for m in more if m not in found}
         laws = max(found, key=lambda laws: found[laws][0])
-    tried = dict.fromkeys([laws, *sorted(alike, key=lambda laws: -found[laws][0])])
     loosest = _each(fit, LOOSEST)
+    likeliest = sorted(alike, key=lambda laws: -found[laws][0])
     looseness = np.inf
-    for each in (*tried, *([loosest] if _vague(fit) else [])):
-        nulls, plain = _tested(fit, found[each if each in found else alike[-1]][1], families, each)
+    for each in dict.fromkeys([laws, *likeliest, loosest]):
+        nulls, plain = _tested(fit, found.get(each, found[alike[-1]])[1], families, each)
         stays = _p(np.array([_excusing(nulls).scores.max()]), plain)[0] > alpha
         if each == laws or (stays and each != loosest):
             kept = nulls, plain, each
         if stays:
-            looseness = max(*each, LAWS[-1]) / LAWS[-1] if each else 1.0
+            looseness = max((*each, LAWS[-1])) / LAWS[-1]
             break
     return Hypothesis(fit, *kept, looseness, plausible(fit, own_effects), found[laws][0])
 
