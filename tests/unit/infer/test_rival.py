@@ -113,7 +113,7 @@ def test_a_rival_out_of_its_range_puts_nothing_out(monkeypatch: pytest.MonkeyPat
 
 
 def test_only_the_laws_that_plain_tires_are_weighed_by_count_against_a_hypothesis() -> None:
-    """A rival that another law makes likelier gains nothing on the runs by the law it stays with."""
+    """A rival that another law makes likelier gains nothing by the law that it stays with."""
     toy = Toy(drawn(np.random.default_rng(4)), alike=True)
     toy.measured = toy.measured + 0.6 * toy.by["twist"][0]
     among = Hypotheses(toy, FAMILIES)
