@@ -9,14 +9,9 @@ from tirelib.inference.compare.forces import ForceComparison
 from tirelib.inference.compare.strain import Comparison
 from tirelib.report.error_sentences import fold_name
 from tirelib.report.explanation import titled
-from tirelib.report.figures.before_after import (
-    force_curves,
-    force_maps,
-    maps,
-    part_errors,
-    run_errors,
-    waveforms,
-)
+from tirelib.report.figures.before_after import force_maps, maps, part_errors, run_errors
+from tirelib.report.figures.compare_forces import force_curves
+from tirelib.report.figures.compare_waveforms import waveforms
 from tirelib.report.figures.waterfall import waterfall_of
 from tirelib.report.page import Table, number, unit_name
 from tirelib.report.parts_page import Part, write_parts_page

@@ -1,4 +1,6 @@
-"""Figures of a comparison of forces: agreement, and differences over the conditions."""
+"""Figures of forces, measured and by one model or two: curves, and differences over conditions."""
+
+from collections.abc import Iterator
 
 import numpy as np
 import plotly.graph_objects as go
@@ -6,31 +8,35 @@ from plotly.subplots import make_subplots
 
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.quantities import QUANTITIES
-from tirelib.inference.compare.force_curves import Curve, ranked, slip_of
+from tirelib.inference.compare.force_curves import Curve, curves_of, ranked, slip_of
 from tirelib.inference.compare.forces import UNITS, ForceComparison
 from tirelib.inference.compare.sentences import told
 from tirelib.inference.identify.error_bands import levels
 from tirelib.inference.identify.force_points import CELL_ANGLE
 from tirelib.report.figures.compare_plot import (
+    SYMBOLS,
     Plot,
+    Trace,
+    above,
     confidence,
+    dots,
     heat,
+    level_line,
     level_means,
-    limit_of,
+    line,
     noise_band,
-    stack_titles,
     stacked,
     styled_figure,
+    ticks,
 )
-from tirelib.report.figures.compare_trends import SYMBOLS
+from tirelib.report.page import number
 from tirelib.report.style import BLUE, CATEGORIES, FAINT, INK, RED
 
-_OVER = tuple(
-    (name, QUANTITIES[name].label, float(QUANTITIES[name].told(1.0)))
-    for name in ("slip_angle", "slip_ratio", "camber", "load", "pressure")
-)
-
+_OVER = ("slip_angle", "slip_ratio", "camber", "load", "pressure")
 _LISTED = ("load", "pressure", "slip_angle", "camber", "slip_ratio")
+_BINS = {"slip_angle": float(np.deg2rad(1.0)), "slip_ratio": 0.02, "camber": CELL_ANGLE}
+"""Width of the bins of a condition that is not set to levels."""
+LESS = "model less measured"
 
 
 def force_plots(found: ForceComparison) -> list[Plot]:
@@ -42,244 +48,215 @@ def _label(found: ForceComparison) -> str:
     return f"{found.quantity} [{UNITS[found.quantity]}] (ISO 8855)"
 
 
-def _slip(found: ForceComparison) -> tuple[str, str, float]:
-    return next(row for row in _OVER if row[0] == slip_of(found.quantity))
+def _told(found: ForceComparison, name: str) -> FloatArray:
+    """Return a condition of the points in its unit."""
+    return np.asarray(QUANTITIES[name].told(getattr(found.data, name)))
 
 
-def _unit(found: ForceComparison) -> tuple[float, str]:
-    """Return factor and name of the unit of differences: noise, or the force's own without."""
-    if np.isfinite(found.noise):
-        return 1.0 / found.noise, "noise"
-    return 1.0, UNITS[found.quantity]
-
-
-def _binned(values: FloatArray, name: str) -> tuple[FloatArray, IntArray]:
-    """Return the middle of each bin and the bin of each value, -1 where unknown."""
-    if name in ("load", "pressure"):
+def _binned(found: ForceComparison, name: str) -> tuple[FloatArray, IntArray]:
+    """Return the middle of each bin, in its unit, and the bin of each value, -1 where unknown."""
+    values = getattr(found.data, name)
+    if name in _BINS:
+        cells, level = np.unique(np.round(np.nan_to_num(values) / _BINS[name]), return_inverse=True)
+        middle, level = cells * _BINS[name] + 0.0, np.asarray(level, dtype=np.int64).ravel()
+    else:
         level = levels(values)
-        count = int(level.max()) + 1
-        return np.array([values[level == k].mean() for k in range(count)]), level
-    step = {"slip_angle": float(np.deg2rad(1.0)), "slip_ratio": 0.02, "camber": CELL_ANGLE}[name]
-    found, level = np.unique(np.round(np.nan_to_num(values) / step), return_inverse=True)
-    return found * step + 0.0, np.asarray(level, dtype=np.int64).ravel()
+        middle = np.array([values[level == k].mean() for k in range(int(level.max()) + 1)])
+    return np.asarray(QUANTITIES[name].told(middle)), level
 
 
 def _map(found: ForceComparison) -> Plot:
-    """Return the difference over slip and load, in units of the noise."""
-    name, label, scale = _slip(found)
-    x, column = _binned(getattr(found.data, name), name)
-    y, row = _binned(found.data.load, "load")
-    factor, unit = _unit(found)
+    """Return the difference over slip and load, in units of the noise where it is known."""
+    slip = QUANTITIES[slip_of(found.quantity)]
+    x, column = _binned(found, slip_of(found.quantity))
+    y, row = _binned(found, "load")
+    unit, factor = UNITS[found.quantity], 1.0
+    if np.isfinite(found.noise):
+        unit, factor = "noise", 1.0 / found.noise
     z = np.full((y.size, x.size), np.nan)
-    for i in range(y.size):
-        for j in range(x.size):
-            inside = (row == i) & (column == j)
-            if inside.any():
-                z[i, j] = factor * float(found.difference[inside].mean())
-    limit = limit_of(z)
+    for i, j in np.ndindex(*z.shape):
+        inside = (row == i) & (column == j)
+        if inside.any():
+            z[i, j] = factor * float(found.difference[inside].mean())
     labels = [told("load", 50.0 * round(float(v) / 50.0)) for v in y]
-    figure = heat(
-        np.round(z, 3),
-        np.round(scale * x, 4),
-        limit,
-        unit,
-        hoverongaps=False,
-        hovertemplate="%{x:.3g}: %{z:.3g} " + unit + "<extra></extra>",
-    )
-    figure.update_xaxes(title=label)
-    figure.update_yaxes(
-        title={"text": "load", "standoff": 12},
-        tickvals=list(range(y.size)),
-        ticktext=labels,
-        showgrid=False,
-    )
-    styled_figure(figure, 220 + 34 * y.size)
-    rows = [[round(scale * float(x[j]), 5), *np.round(z[:, j], 4).tolist()] for j in range(x.size)]
-    return Plot(
+    figure = heat(z, x, slip.label, unit, 220 + 34 * y.size, hoverongaps=False)
+    ticks(figure, range(y.size), labels, "load")
+    names = [f"load {text}: [{unit}]" for text in labels]
+    return Plot.of(
         "force-map",
-        f"{found.quantity}: model less measured over {label.split(' [')[0]} and load",
+        f"{found.quantity}: {LESS} over {slip.title} and load",
         "Mean over the points of a bin. Red: the model is above the measurement with its sign; "
         "blue: below.",
         figure,
-        [label, *(f"load {text}: [{unit}]" for text in labels)],
-        rows,
+        [(slip.label, x), *zip(names, z, strict=True)],
+        4,
     )
 
 
 def curve_plots(found: ForceComparison, curves: tuple[Curve, ...]) -> list[Plot]:
     """Return measurement and model over the slip for the best, the median and the worst curve."""
-    return [_curve(found, curve, name) for name, curve in ranked(curves).items()]
+    return [_one(found, curve, name) for name, curve in ranked(curves).items()]
 
 
-def _curve(found: ForceComparison, curve: Curve, place: str) -> Plot:
-    name, label, scale = _slip(found)
-    unit = UNITS[found.quantity]
-    k = curve.member
-    x = scale * getattr(found.data, name)[k]
+def force_curves(before: ForceComparison, after: ForceComparison) -> list[Plot]:
+    """Return both models' forces on the worst, the median and the best curve of before."""
+    named = ranked(curves_of(before))
+    return [_two(before, after, named[name], name) for name in reversed(named)]
+
+
+def _one(found: ForceComparison, curve: Curve, place: str) -> Plot:
+    slip, unit, k = slip_of(found.quantity), UNITS[found.quantity], curve.member
+    x, label = _told(found, slip)[k], QUANTITIES[slip].label
     measured, model, rest = found.measured[k], found.predicted[k], found.difference[k]
     figure = stacked(
-        x,
-        [
-            {"y": measured, "name": "measured", "marker": {"color": BLUE, "size": 6}},
-            {"y": model, "name": "model", "marker": {"color": RED, "size": 6, "symbol": "x"}},
-        ],
-        [{"y": rest, "name": "model less measured", "marker": {"color": INK, "size": 5}}],
-        mode="markers",
+        [dots(x, measured, "measured", BLUE, 6), dots(x, model, "model", RED, 6, symbol="x")],
+        [dots(x, rest, LESS, INK, 5)],
+        (label, _label(found)),
+        unit,
+        found.noise,
     )
-    noise_band(figure, found.noise, row=2, col=1)
-    stack_titles(figure, label, _label(found), unit)
     noise = f", {curve.rms / found.noise:.1f} noise" if np.isfinite(found.noise) else ""
-    rows = np.round(np.stack([x, measured, model, rest], axis=1), 5).tolist()
-    return Plot(
+    names = (f"{what} [{unit}]" for what in ("measured", "model", LESS))
+    return Plot.of(
         f"force-{place}",
         f"{place.capitalize()} curve: {curve.words}",
         f"Difference {curve.rms:.3g} {unit} rms{noise}, {curve.points} points. The model is "
         "computed at the conditions of each point. Grey: 95 % of the noise.",
         figure,
-        [label, f"measured [{unit}]", f"model [{unit}]", f"model less measured [{unit}]"],
-        rows,
+        {label: x, **dict(zip(names, (measured, model, rest), strict=True))},
+        5,
+    )
+
+
+def _two(before: ForceComparison, after: ForceComparison, curve: Curve, name: str) -> Plot:
+    slip, unit, k = slip_of(before.quantity), UNITS[before.quantity], curve.member
+    x, label, measured = _told(before, slip)[k], QUANTITIES[slip].label, before.measured[k]
+    data = {label: x, f"measured [{unit}]": measured}
+    values: list[Trace] = [dots(x, measured, "measured", INK, symbol="circle-open")]
+    differences: list[Trace] = []
+    looks = ((before, "before", RED, "x"), (after, "after", BLUE, "circle"))
+    for found, word, colour, symbol in looks:
+        model, rest = found.predicted[k], found.difference[k]
+        data |= {f"model {word} [{unit}]": model, f"{word} less measured [{unit}]": rest}
+        values.append(dots(x, model, f"model {word}", colour, 5, symbol=symbol))
+        trace = dots(x, rest, f"model {word} minus measured", colour, 5, symbol=symbol)
+        differences.append(trace | {"showlegend": False})
+    was, is_now = (
+        number(float(np.sqrt(np.mean(found.difference[k] ** 2))), 3) for found in (before, after)
+    )
+    return Plot.of(
+        f"curve-{name}",
+        f"{name.capitalize()} curve of before: {curve.words}",
+        f"The difference was {was} {unit} rms and is {is_now}. The models are computed at the "
+        "conditions of each point. Grey: 95 % of the noise.",
+        stacked(values, differences, (label, _label(before)), unit, before.noise),
+        data,
+        5,
     )
 
 
 def force_trends(found: ForceComparison) -> list[Plot]:
     """Return the mean difference over each condition that varies, with confidence bands."""
-    used = [row for row in _OVER if _varies(getattr(found.data, row[0]), row[0])]
-    return [_trend(found, *row) for row in used]
+    return [_trend(found, name) for name in _varied(found)]
 
 
-def _trend(found: ForceComparison, name: str, label: str, scale: float) -> Plot:
-    unit = UNITS[found.quantity]
-    x, column = _binned(getattr(found.data, name), name)
-    own = name == slip_of(found.quantity)
-    size = np.abs(found.predicted) - np.abs(found.measured)
-    difference = found.difference if own else size
-    what = f"model less measured {found.quantity}" if own else f"size of {found.quantity} too large"
-    centre, half, count = level_means(difference, column, x.size)
-    x = scale * x
+def _varied(found: ForceComparison) -> Iterator[str]:
+    """Return the conditions that vary."""
+    for name in _OVER:
+        values = getattr(found.data, name)
+        if name in ("load", "pressure"):
+            varies = int(levels(values).max()) > 0
+        else:
+            varies = float(np.ptp(values)) > (0.005 if name == "slip_ratio" else 0.01)
+        if varies:
+            yield name
+
+
+def _trend(found: ForceComparison, name: str) -> Plot:
+    unit, label = UNITS[found.quantity], QUANTITIES[name].label
+    x, column = _binned(found, name)
+    if name == slip_of(found.quantity):
+        what, text, values = f"{LESS} {found.quantity}", "", found.difference
+    else:
+        what, text = (
+            f"size of {found.quantity} too large",
+            ("The differences are those of the magnitudes, because both signs of the slip occur. "),
+        )
+        values = np.abs(found.predicted) - np.abs(found.measured)
+    centre, half, count = level_means(values, column, x.size)
     figure = go.Figure()
     confidence(figure, x, centre, half, "points")
-    figure.add_hline(y=0.0, line={"color": FAINT, "width": 1})
+    level_line(figure)
     figure.update_xaxes(title=label)
     figure.update_yaxes(title=f"{what} [{unit}]")
-    styled_figure(figure, 380, legend={"orientation": "h", "y": 1.12, "x": 0.0})
-    rows = np.round(np.stack([x, count, centre, half], axis=1), 5).tolist()
-    return Plot(
+    return Plot.of(
         f"force-trend-{name.replace('_', '-')}",
-        f"Mean difference by {label.split(' [')[0]}",
-        (
-            ""
-            if own
-            else "The differences are those of the magnitudes, because both signs of the "
-            "slip occur. "
-        )
-        + "The band is the 95 % confidence interval of the bin's mean, from the scatter of its "
-        "points over the other conditions; bins of one point have none.",
-        figure,
-        [label, "points", f"{what} [{unit}]", f"95 % half-width [{unit}]"],
-        rows,
+        f"Mean difference by {QUANTITIES[name].title}",
+        f"{text}The band is the 95 % confidence interval of the bin's mean, from the scatter of "
+        "its points over the other conditions; bins of one point have none.",
+        styled_figure(figure, 380, legend=above()),
+        {label: x, "points": count, f"{what} [{unit}]": centre, f"95 % half-width [{unit}]": half},
+        5,
     )
 
 
 def _over_slip(found: ForceComparison) -> Plot:
-    name, label, factor = _slip(found)
-    x = factor * getattr(found.data, name)
-    level = levels(found.data.load)
-    figure = go.Figure()
+    slip = QUANTITIES[slip_of(found.quantity)]
+    x, level, figure = _told(found, slip_of(found.quantity)), levels(found.data.load), go.Figure()
     for k in range(int(level.max()) + 1):
         member = np.flatnonzero(level == k)
         member = member[np.argsort(x[member])]
-        color = CATEGORIES[k % len(CATEGORIES)]
-        load = f"{found.data.load[member].mean():,.0f} N"
-        figure.add_scatter(
-            x=x[member],
-            y=found.measured[member],
-            mode="markers",
-            name=f"measured, {load}",
-            marker={"color": color, "size": 7, "symbol": SYMBOLS[k % len(SYMBOLS)]},
-        )
-        figure.add_scatter(
-            x=x[member],
-            y=found.predicted[member],
-            mode="lines",
-            name=f"model, {load}",
-            line={"color": color, "dash": "dash"},
-        )
-    figure.update_xaxes(title=label)
+        colour, symbol = CATEGORIES[k % len(CATEGORIES)], SYMBOLS[k % len(SYMBOLS)]
+        load, at = f"{found.data.load[member].mean():,.0f} N", x[member]
+        measured, model = found.measured[member], found.predicted[member]
+        figure.add_scatter(**dots(at, measured, f"measured, {load}", colour, symbol=symbol))
+        figure.add_scatter(**line(at, model, f"model, {load}", colour, dash="dash"))
+    figure.update_xaxes(title=slip.label)
     figure.update_yaxes(title=_label(found))
-    styled_figure(figure, 480, legend={"x": 1.02, "y": 1.0})
-    rows = _rows(found)
-    return Plot(
+    return _points(
+        found,
         "force-slip",
-        f"{found.quantity} over {label.split(' [')[0]}",
-        "Points are means over a cell of conditions; lines join the model's points at the "
-        "same load.",
-        figure,
-        *rows,
+        f"{found.quantity} over {slip.title}",
+        "Points are means over a cell of conditions; lines join the model's points at the same "
+        "load.",
+        styled_figure(figure, 480, legend={"x": 1.02, "y": 1.0}),
     )
 
 
-def _rows(found: ForceComparison) -> tuple[list[str], list[list[float]]]:
-    unit = UNITS[found.quantity]
-    said = [QUANTITIES[name] for name in _LISTED]
-    told = [QUANTITIES[name].told(getattr(found.data, name)) for name in _LISTED]
-    table = np.stack([*told, found.measured, found.predicted, found.difference], axis=1)
-    names = [f"{each.title} [{each.words or '-'}]" for each in said]
-    names += [f"{what} [{unit}]" for what in ("measured", "model", "model less measured")]
-    return names, np.round(table, 5).tolist()
+def _points(found: ForceComparison, name: str, title: str, caption: str, figure: go.Figure) -> Plot:
+    """Return a plot whose data are all points."""
+    unit, data = UNITS[found.quantity], {}
+    for each in _LISTED:
+        data[f"{QUANTITIES[each].title} [{QUANTITIES[each].words or '-'}]"] = _told(found, each)
+    names = (f"{what} [{unit}]" for what in ("measured", "model", LESS))
+    data |= zip(names, (found.measured, found.predicted, found.difference), strict=True)
+    return Plot.of(name, title, caption, figure, data, 5)
 
 
 def _agreement(found: ForceComparison) -> Plot:
-    figure = go.Figure()
-    ends = [
-        float(min(found.measured.min(), found.predicted.min())),
-        float(max(found.measured.max(), found.predicted.max())),
-    ]
-    figure.add_scatter(
-        x=ends, y=ends, mode="lines", name="model = measured", line={"color": FAINT, "width": 1}
-    )
-    figure.add_scatter(
-        x=found.measured,
-        y=found.predicted,
-        mode="markers",
-        name="points",
-        marker={"color": BLUE, "size": 6},
-    )
+    both = np.concatenate([found.measured, found.predicted])
+    ends, figure = [float(both.min()), float(both.max())], go.Figure()
+    figure.add_scatter(**line(ends, ends, "model = measured", FAINT, width=1))
+    figure.add_scatter(**dots(found.measured, found.predicted, "points", BLUE, 6))
     figure.update_xaxes(title=f"measured {_label(found)}")
     figure.update_yaxes(title=f"model {_label(found)}")
     styled_figure(figure, 480, legend={"orientation": "h", "y": 1.1})
-    return Plot("force-agreement", "Agreement", "Model against measurement.", figure, *_rows(found))
-
-
-def _varies(values: FloatArray, name: str) -> bool:
-    if name in ("load", "pressure"):
-        return int(levels(values).max()) > 0
-    return float(np.ptp(values)) > (0.005 if name == "slip_ratio" else 0.01)
+    return _points(found, "force-agreement", "Agreement", "Model against measurement.", figure)
 
 
 def _differences(found: ForceComparison) -> Plot:
-    used = [row for row in _OVER if _varies(getattr(found.data, row[0]), row[0])]
-    used = used or [_slip(found)]
+    used = [*_varied(found)] or [slip_of(found.quantity)]
     figure = make_subplots(rows=1, cols=len(used), shared_yaxes=True, horizontal_spacing=0.04)
-    for k, (name, label, factor) in enumerate(used, start=1):
-        figure.add_scatter(
-            x=factor * getattr(found.data, name),
-            y=found.difference,
-            mode="markers",
-            marker={"color": BLUE, "size": 5},
-            showlegend=False,
-            row=1,
-            col=k,
-        )
-        figure.update_xaxes(title=label, row=1, col=k)
+    for k, name in enumerate(used, start=1):
+        trace = dots(_told(found, name), found.difference, "points", BLUE, 5)
+        figure.add_scatter(**trace, showlegend=False, row=1, col=k)
+        figure.update_xaxes(title=QUANTITIES[name].label, row=1, col=k)
         noise_band(figure, found.noise, row=1, col=k)
-    figure.update_yaxes(
-        title=f"model less measured {found.quantity} [{UNITS[found.quantity]}]", row=1, col=1
-    )
-    styled_figure(figure, 420)
-    return Plot(
+    figure.update_yaxes(title=f"{LESS} {found.quantity} [{UNITS[found.quantity]}]", row=1, col=1)
+    return _points(
+        found,
         "force-differences",
         "Difference over the conditions",
         "Grey: 95 % of the noise from repeats, where there are any.",
-        figure,
-        *_rows(found),
+        styled_figure(figure, 420),
     )

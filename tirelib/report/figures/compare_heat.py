@@ -1,28 +1,25 @@
 """Heat maps of a comparison: model less measured over wheel angle and condition."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 
 import numpy as np
 import plotly.graph_objects as go
 
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.quantities import QUANTITIES
-from tirelib.inference.compare.document import edge_value
 from tirelib.inference.compare.sentences import millimetres, told
 from tirelib.inference.compare.strain import Comparison
 from tirelib.inference.identify.error_bands import levels
-from tirelib.measured.waveforms import GRID
-from tirelib.report.figures.compare_plot import (
-    ANGLE_TITLE,
-    Plot,
-    heat,
-    limit_of,
-    styled_figure,
-)
+from tirelib.report.figures.compare_plot import DEGREES, Plot, above, line, ticks, turn_map
+from tirelib.report.style import INK
 
-DEGREES = np.rad2deg(GRID)
 NAMES = {name: quantity.title for name, quantity in QUANTITIES.items()} | {"gage": "gage"}
 SIGN = "Red: the model shows too much tension (too little compression); blue: too much compression."
+FEW = 12
+"""Rows of a map up to which the pointer names the row."""
+_SLIPS = {"slip_angle": (" deg slip angle", 0.25), "camber": (" deg camber", 0.25)}
+_SLIPS["slip_ratio"] = (" slip ratio", 0.005)
+"""How a run's slip is said, and from which size, in that unit."""
 
 
 def heat_maps(found: Comparison) -> list[Plot]:
@@ -30,26 +27,24 @@ def heat_maps(found: Comparison) -> list[Plot]:
     plots = [_runs(found)]
     for factor in found.chosen.factors:
         members = [factor.level == k for k in range(factor.values.size)]
-        rows = [(told(factor.name, v), edge_value(factor.name, v)) for v in factor.values]
         data = np.stack([found.difference[m].mean(axis=0) for m in members])
+        labels = [told(factor.name, value) for value in factor.values]
         count = [int(m.sum()) for m in members]
         unit = QUANTITIES[factor.name].words
-        plots.append(_map(found, data, rows, count, factor.name, unit))
+        plots.append(_map(found, data, labels, count, factor.name, unit))
     return plots
 
 
 def gage_plots(found: Comparison) -> list[Plot]:
     """Return the map by gage, from the right to the left; nothing for one gage."""
-    plots = []
     straight = found.chosen.straight
-    lateral = [1e3 * found.chosen.waves.header.gage_lateral[g] for g in found.chosen.gages]
-    if len(lateral) > 1:
-        order = np.argsort(lateral)
-        data = found.by_gage[straight].mean(axis=0)[order]
-        rows = [(f"y = {millimetres(1e-3 * lateral[k])}", lateral[k]) for k in order]
-        count = [int(straight.sum())] * len(rows)
-        plots.append(_map(found, data, rows, count, "gage", "mm"))
-    return plots
+    lateral = np.array([found.chosen.waves.header.gage_lateral[g] for g in found.chosen.gages])
+    if lateral.size < 2:
+        return []
+    order = np.argsort(lateral)
+    data = found.by_gage[straight].mean(axis=0)[order]
+    labels = [f"y = {millimetres(y)}" for y in lateral[order]]
+    return [_map(found, data, labels, [int(straight.sum())] * len(labels), "gage", "mm")]
 
 
 def unit_of(found: Comparison) -> tuple[float, str]:
@@ -59,57 +54,50 @@ def unit_of(found: Comparison) -> tuple[float, str]:
     return 1e6, "microstrain"
 
 
-def _runs(found: Comparison) -> Plot:
+def place_of(found: Comparison, i: int) -> str:
+    """Say load, pressure and speed of a run."""
     c = found.chosen.waves.conditions
-    slip = np.nan_to_num(c["slip_angle"])
-    keys = (np.nan_to_num(c["slip_ratio"]), c["speed"], c["pressure"], slip)
-    load = levels(c["Fz"])
-    straight = ~found.chosen.straight
-    order = np.lexsort((*(np.round(key, 3) for key in keys), load, straight))
+    return f"{c['pressure'][i] / 1e5:.2f} bar, {c['speed'][i] * 3.6:.0f} km/h"
+
+
+def _runs(found: Comparison) -> Plot:
+    c, straight = found.chosen.waves.conditions, found.chosen.straight
+    slip_ratio, slip_angle = (np.nan_to_num(c[name]) for name in ("slip_ratio", "slip_angle"))
+    keys = [np.round(key, 3) for key in (slip_ratio, c["speed"], c["pressure"], slip_angle)]
+    order = np.lexsort((*keys, levels(c["Fz"]), ~straight))
     factor, unit = unit_of(found)
     data = factor * found.difference[order]
     labels = [
-        f"run {found.run[i]}: {c['Fz'][i]:.0f} N, {c['pressure'][i] / 1e5:.2f} bar, "
-        f"{c['speed'][i] * 3.6:.0f} km/h" + _slip(c, i)
+        f"run {found.run[i]}: {c['Fz'][i]:.0f} N, {place_of(found, i)}{_slip(found, i)}"
         for i in order
     ]
-    figure = _heat(data, labels, unit)
-    ticks, texts = _load_ticks(found, order)
-    figure.update_yaxes(
-        title={"text": "runs by load, pressure and speed", "standoff": 12},
-        tickvals=ticks,
-        ticktext=texts,
-        showgrid=False,
-        range=[-0.5, len(order) - 0.5],
-    )
+    figure = _turns(data, labels, unit, 620)
+    ticks(figure, *_load_ticks(found, order), "runs by load, pressure and speed")
+    figure.update_yaxes(range=[-0.5, len(order) - 0.5])
     edges = np.rad2deg(found.prediction.edges[order])
-    first = int(found.chosen.straight.sum())
-    _edges(
-        figure,
-        np.insert(edges, first, np.nan, axis=0),
-        np.insert(np.arange(len(order)), first, first).tolist(),
-    )
-    styled_figure(figure, 620, showlegend=True, legend=_LEGEND)
-    return Plot(
+    first = int(straight.sum())  # between the counted runs and the others the lines are open
+    edges = np.insert(edges, first, np.nan, axis=0)
+    rows = np.insert(np.arange(len(order)), first, first).tolist()
+    for side, name, dash in ((0, "entry", "dot"), (1, "exit", "solid")):
+        text = f"{name} of the contact (model)"
+        trace = line(np.round(edges[:, side], 2), rows, text, INK, width=1.2, dash=dash)
+        figure.add_scatter(**trace, hoverinfo="skip")
+    figure.update_layout(showlegend=True, legend=above(1.08))
+    return Plot.of(
         "heat-runs",
         "Every run: model less measured",
         f"In units of {'the noise of the repeats' if unit == 'noise' else 'microstrain'}; set "
         f"points taken out; colours end at the 99.5 % quantile. {SIGN} Lines: the model's contact.",
         figure,
-        *_table(labels, "run", data, unit),
+        *_data(labels, "run", data, unit),
     )
 
 
-def _slip(c: Mapping[str, FloatArray], i: int) -> str:
+def _slip(found: Comparison, i: int) -> str:
     out = ""
-    for name, unit, factor in (
-        ("slip_angle", " deg slip angle", np.rad2deg(1.0)),
-        ("camber", " deg camber", np.rad2deg(1.0)),
-        ("slip_ratio", " slip ratio", 1.0),
-    ):
-        value = np.nan_to_num(c[name][i]) * factor
-        if abs(value) > (0.25 if factor > 1 else 0.005):
-            out += f", {value:+.3g}{unit}"
+    for name, (unit, least) in _SLIPS.items():
+        value = QUANTITIES[name].told(np.nan_to_num(found.chosen.waves.conditions[name][i]))
+        out += f", {value:+.3g}{unit}" if abs(value) > least else ""
     return out
 
 
@@ -117,87 +105,52 @@ def _load_ticks(found: Comparison, order: IntArray) -> tuple[list[float], list[s
     """Return a tick in the middle of the runs of each load, where there is room for it."""
     load, straight = found.chosen.waves.conditions["Fz"], found.chosen.straight[order]
     level = levels(load)[order]
-    ticks: list[float] = []
+    places: list[float] = []
     texts: list[str] = []
     for counted in (True, False):
         for k in range(int(level.max()) + 1):
             where = np.flatnonzero((level == k) & (straight == counted))
-            if where.size and (not ticks or where.mean() - ticks[-1] > 0.03 * order.size):
-                ticks.append(float(where.mean()))
+            if where.size and (not places or where.mean() - places[-1] > 0.03 * order.size):
+                places.append(float(where.mean()))
                 mean = 50.0 * round(float(load[order][where].mean()) / 50.0)
                 texts.append(told("load", mean) + ("" if counted else ", slip"))
-    return ticks, texts
+    return places, texts
 
 
 def _map(
     found: Comparison,
     data: FloatArray,
-    rows: list[tuple[str, float]],
-    count: list[int],
+    labels: Sequence[str],
+    count: Sequence[int],
     name: str,
     unit: str,
 ) -> Plot:
     factor, noise = unit_of(found)
-    values = factor * data
-    labels = [text for text, _ in rows]
-    figure = _heat(
-        values,
-        [f"{t} ({n} runs)" for t, n in zip(labels, count, strict=True)],
-        noise,
-    )
-    figure.update_yaxes(
-        title={"text": NAMES[name], "standoff": 12},
-        tickvals=list(range(len(labels))),
-        ticktext=labels,
-        showgrid=False,
-    )
-    styled_figure(figure, 200 + 34 * len(labels))
+    said = [f"{text} ({n} runs)" for text, n in zip(labels, count, strict=True)]
+    figure = _turns(factor * data, said, noise, 200 + 34 * len(labels))
+    ticks(figure, range(len(labels)), labels, NAMES[name])
     axes = " (ISO 8855)" if name == "gage" or QUANTITIES[name].signed else ""
-    return Plot(
+    return Plot.of(
         f"heat-{name.replace('_', '-')}",
         f"By {NAMES[name]}{axes}",
         f"Mean over the runs of each level. {SIGN}",
         figure,
-        *_table(labels, f"{NAMES[name]}{f' [{unit}]' if unit else ''}", values, noise),
+        *_data(labels, f"{NAMES[name]}{f' [{unit}]' if unit else ''}", factor * data, noise),
     )
 
 
-_LEGEND = {"orientation": "h", "y": 1.08, "x": 0.0}
+def _turns(data: FloatArray, labels: Sequence[str], unit: str, height: int) -> go.Figure:
+    """Return a map whose rows the pointer names, where they are few."""
+    if len(labels) > FEW:
+        return turn_map(data, unit, height)
+    said = np.broadcast_to(np.array(labels, dtype=object)[:, None], data.shape)
+    hover = "%{text}<br>%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>"
+    return turn_map(data, unit, height, text=said, hovertemplate=hover)
 
 
-def _heat(data: FloatArray, labels: list[str], unit: str) -> go.Figure:
-    limit = limit_of(data)
-    few = len(labels) <= 12
-    figure = heat(
-        np.round(data, 2),
-        np.round(DEGREES, 3),
-        limit,
-        unit,
-        text=np.broadcast_to(np.array(labels, dtype=object)[:, None], data.shape) if few else None,
-        hovertemplate=("%{text}<br>" if few else "")
-        + "%{x:.0f} deg: %{z:.3g} "
-        + unit
-        + "<extra></extra>",
-    )
-    figure.update_xaxes(title=ANGLE_TITLE, range=[-180, 180], dtick=30)
-    return figure
-
-
-def _edges(figure: go.Figure, edges: FloatArray, y: list[int]) -> None:
-    for side, name in ((0, "entry of the contact (model)"), (1, "exit of the contact (model)")):
-        figure.add_scatter(
-            x=np.round(edges[:, side], 2),
-            y=y,
-            mode="lines",
-            name=name,
-            hoverinfo="skip",
-            line={"color": "#1c2530", "width": 1.2, "dash": "solid" if side else "dot"},
-        )
-
-
-def _table(
-    labels: list[str], first: str, data: FloatArray, unit: str
-) -> tuple[list[str], list[list[object]]]:
-    """Return the data: a row per angle and a column per level."""
-    rows = [[round(float(a), 3), *np.round(data[:, j], 4).tolist()] for j, a in enumerate(DEGREES)]
-    return ["wheel angle [deg]", *(f"{first} {text}: [{unit}]" for text in labels)], rows
+def _data(
+    labels: Sequence[str], first: str, data: FloatArray, unit: str
+) -> tuple[list[tuple[str, FloatArray]], int]:
+    """Return the data, a row per angle and a column per level, and their decimals."""
+    named = [f"{first} {text}: [{unit}]" for text in labels]
+    return [("wheel angle [deg]", DEGREES), *zip(named, data, strict=True)], 4

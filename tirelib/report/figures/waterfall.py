@@ -40,26 +40,18 @@ def waterfall(
     """
     labels = [f"{k}: {step.label}" if k else step.label for k, step in enumerate(steps)]
     figure = go.Figure()
-    figure.add_bar(
-        x=labels,
-        y=[step.error for step in steps],
-        name="fitted",
-        marker={"color": BLUE},
-        text=[f"{step.error:.3g}" for step in steps],
-        textposition="outside",
-        cliponaxis=False,
-    )
-    held = np.array([step.held_out for step in steps])
-    if np.isfinite(held).any():
-        figure.add_bar(
-            x=labels,
-            y=[float(h) if np.isfinite(h) else None for h in held],
-            name="held out",
-            marker={"color": RED},
-            text=[f"{h:.3g}" if np.isfinite(h) else "" for h in held],
-            textposition="outside",
-            cliponaxis=False,
-        )
+    errors, held = [step.error for step in steps], [step.held_out for step in steps]
+    for values, what, colour in ((errors, "fitted", BLUE), (held, "held out", RED)):
+        if np.isfinite(values).any():
+            figure.add_bar(
+                x=labels,
+                y=[float(value) if np.isfinite(value) else None for value in values],
+                name=what,
+                marker={"color": colour},
+                text=[f"{value:.3g}" if np.isfinite(value) else "" for value in values],
+                textposition="outside",
+                cliponaxis=False,
+            )
     if np.isfinite(floor):
         figure.add_hline(
             y=floor,
@@ -70,15 +62,13 @@ def waterfall(
     figure.update_yaxes(title=f"error [{unit}]", rangemode="tozero")
     figure.update_xaxes(title="effect added (-: removed)")
     styled_figure(figure, 380, barmode="group")
-    rows = [[label, step.error, step.held_out] for label, step in zip(labels, steps, strict=True)]
-    return Plot(
+    return Plot.of(
         name,
         title,
         "Rms error after each step, fitted anew each time; held out: on points that took no part "
         "in the fit.",
         figure,
-        ["step", f"error [{unit}]", f"held-out error [{unit}]"],
-        rows,
+        {"step": labels, f"error [{unit}]": errors, f"held-out error [{unit}]": held},
     )
 
 
