@@ -19,6 +19,7 @@ from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import write_tire
 
 PLANTED = {"friction_pressure": 0.3, "stiffness_temperature": 0.5, "brush_camber": 0.08}
+PAIR = ("--suspects", "friction_pressure,friction_drift")
 MINE = """
 from tirelib.effects import effect
 
@@ -198,8 +199,10 @@ def test_the_next_test_of_forces_is_the_diagnosis_s_advice(
     assert (plan["quantity"], plan["verdict"]) == ("Fy", told["verdict"])
     # one set of effects is left
     assert plan["between"] == []
-    pair = ("--suspects", "friction_pressure,friction_drift")
-    plan = done(*words, *pair, "--json", place / "N.json")
+    found = call(*words, *PAIR, "--json", place / "N.json")
+    assert found.exit_code == 0, found.output
+    assert re.search(r"-\d[\d.]* to", found.output), found.output
+    plan = json.loads((place / "N.json").read_text())
     assert plan["between"] == ["friction_pressure", "friction_drift"]
     # the campaign is one of sweeps, and so is the advised run
     angles = plan["best"]["slip_angles_deg"]
@@ -209,22 +212,20 @@ def test_the_next_test_of_forces_is_the_diagnosis_s_advice(
 
 
 def test_a_point_in_the_place_of_a_sweep_may_be_asked_for(place: Path) -> None:
-    words = (
+    ranges = ("--load-range", 1700, 1700, "--camber-range", 0, 0, "--temperature-range", 60, 60)
+    plan = done(
         "next-test",
         place / "sweep",
         "--model",
         place / "M.toml",
         "--quantity",
         "Fy",
-        "--suspects",
-        "friction_pressure,friction_drift",
+        *PAIR,
+        *ranges,
+        "--no-sweep",
         "--json",
         place / "P.json",
     )
-    found = call(*words)
-    assert found.exit_code == 0, found.output
-    assert re.search(r"-\d[\d.]* to", found.output), found.output
-    plan = done(*words, "--no-sweep")
     assert "slip_angles_deg" not in plan["best"]
     assert -9.5 < plan["best"]["slip_angle_deg"] < 9.5
     assert plan["envelope"]["points_of_run"] == 1
