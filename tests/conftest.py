@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests import once
 from tests.schema_check import wrong_documents
 
 settings.register_profile(
@@ -29,11 +30,17 @@ sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Give the processes of a run a folder in common."""
+    once.share_a_folder(config)
+
+
 @pytest.fixture(scope="session", autouse=True)
 def documents_are_as_their_schemas_say(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Check every JSON document that the tests of this process left in their folders."""
     yield
-    wrong = list(wrong_documents(tmp_path_factory.getbasetemp()))
+    folders = (tmp_path_factory.getbasetemp(), *once.MADE)
+    wrong = [document for folder in folders for document in wrong_documents(folder)]
     assert not wrong, "\n".join(wrong)
 
 

@@ -13,13 +13,10 @@ from pythonfmu import FmuBuilder
 from tests.bench.browser import chromium
 from tests.bench.campaigns import write_tiny_campaign
 from tests.bench.programs import Program
-from tests.synthetic import cornering_runs, write
+from tests.trained import observed_and_trained
 from tirebench.estimator.fmu_archive import read_fmu
 from tirebench.estimator.trust import remember
-from tirelib.campaign import read_campaign
 from tirelib.estimators.calibration import Calibration
-from tirelib.estimators.train import train
-from tirelib.measured.observations import observe
 
 TOY = Path(__file__).with_name("toy_slave.py")
 BUILD = Path(__file__).parents[2] / "build"
@@ -61,9 +58,8 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def calibration(tmp_path_factory: pytest.TempPathFactory) -> Calibration:
-    folder = write(tmp_path_factory.mktemp("calibration") / "set1", cornering_runs())
-    return train(observe([read_campaign(folder)])).calibration
+def calibration() -> Calibration:
+    return observed_and_trained()[1].calibration
 
 
 def build_toy(folder: Path, samples: int, source: Path = TOY) -> Path:

@@ -6,7 +6,7 @@ from pathlib import Path
 from cosim.calibrate import CALIBRATION
 from cosim.vehicle14.build_fmu import build_vehicle
 
-from tests.fmu import live
+from tests.once import once
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.virtual.spec import build_virtual, friction_surface
 
@@ -15,15 +15,25 @@ SAMPLES, STEP = 20, 2e-3
 
 @cache
 def vehicle() -> Path:
-    return build_vehicle(live.folder() / "VehicleModel.fmu")
+    name = "VehicleModel.fmu"
+    return once("cosim_vehicle", lambda place: build_vehicle(place / name)) / name
 
 
 @cache
 def virtual() -> Path:
-    path = live.folder() / f"Slippery_{SAMPLES}.fmu"
-    return build_virtual(path, samples_per_step=SAMPLES, surface=friction_surface())
+    name = f"Slippery_{SAMPLES}.fmu"
+
+    def build(place: Path) -> None:
+        build_virtual(place / name, samples_per_step=SAMPLES, surface=friction_surface())
+
+    return once("cosim_virtual", build) / name
 
 
 @cache
 def strain() -> Path:
-    return build_fmu(CALIBRATION, live.folder() / "Cosim.fmu", samples_per_step=SAMPLES)
+    name = "Cosim.fmu"
+
+    def build(place: Path) -> None:
+        build_fmu(CALIBRATION, place / name, samples_per_step=SAMPLES)
+
+    return once("cosim_strain", build) / name

@@ -9,19 +9,16 @@ pytest.importorskip("distributed", reason="the extra tirelib[fleet] is not insta
 
 from distributed import Client, LocalCluster
 
-from tests.synthetic import cornering_runs, synthetic_run, write
-from tirelib.campaign import read_campaign
+from tests.synthetic import synthetic_run, write
+from tests.trained import observed_and_trained
 from tirelib.estimators.calibration_file import write_calibration
-from tirelib.estimators.train import train
-from tirelib.measured.observations import observe
 
 
 @pytest.fixture(scope="session")
 def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("calibration")
-    write(folder / "campaign", cornering_runs())
-    trained = train(observe([read_campaign(folder / "campaign")]))
-    return write_calibration(trained.calibration, folder / "cal.toml", {}) or folder / "cal.toml"
+    path = tmp_path_factory.mktemp("calibration") / "cal.toml"
+    write_calibration(observed_and_trained()[1].calibration, path, {})
+    return path
 
 
 @pytest.fixture(scope="session")

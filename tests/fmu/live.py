@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.once import once
 from tests.synthetic import LATERAL, record
 from tirelib.campaign import CampaignHeader, Run, RunPlan, TireGeometry, write_campaign
 from tirelib.campaign.read import read_campaign
@@ -110,15 +111,18 @@ def folder() -> Path:
 @cache
 def campaign_folder() -> Path:
     """Return the campaign, written once."""
-    path = folder() / "campaign"
-    write_campaign(path, HEADER, make_runs())
-    return path
+    return (
+        once("live", lambda at: write_campaign(at / "campaign", HEADER, make_runs())) / "campaign"
+    )
 
 
 @cache
 def calibration_file() -> Path:
     """Return the calibration, made once."""
-    path = folder() / "cal.toml"
+    return once("live_calibration", _calibrate) / "cal.toml"
+
+
+def _calibrate(place: Path) -> None:
     told = {"unit": "N", "n": 15, "conditions": 15, "cross_validated_rmse": 12.3, "r2": 0.99}
     campaign = read_campaign(campaign_folder())
     observations = observe([campaign])
@@ -126,10 +130,9 @@ def calibration_file() -> Path:
     turn = typical_turn([campaign], observations, trained)
     write_calibration(
         replace(trained, reference=turn),
-        path,
+        place / "cal.toml",
         {"statistics": {"Fz": told}, "data": [{"name": "live"}]},
     )
-    return path
 
 
 @cache
@@ -147,14 +150,19 @@ def kind(case: tuple[int, bool]) -> str:
 def fmu_file(samples: int, *, buffered: bool = False, python: bool = False) -> Path:
     """Return an FMU that takes frames of so many samples."""
     kind = ("_buffered" if buffered else "") + ("_python" if python else "")
-    return build_fmu(
-        calibration_file(),
-        folder() / f"StrainTire_{samples}{kind}.fmu",
-        samples_per_step=samples,
-        sample_rate=RATE,
-        buffered=buffered,
-        python=python,
-    )
+    name = f"StrainTire_{samples}{kind}.fmu"
+
+    def build(place: Path) -> None:
+        build_fmu(
+            calibration_file(),
+            place / name,
+            samples_per_step=samples,
+            sample_rate=RATE,
+            buffered=buffered,
+            python=python,
+        )
+
+    return once(f"fmu_{name}", build) / name
 
 
 def is_python(fmu: LoadedFmu) -> bool:

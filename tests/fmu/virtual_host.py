@@ -12,6 +12,7 @@ from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
 from tests.fmu import live
+from tests.once import once
 from tirelib.campaign import CampaignHeader, Run, RunPlan, TireGeometry, write_campaign
 from tirelib.campaign.read import read_campaign
 from tirelib.estimators.calibration_file import write_calibration
@@ -48,14 +49,22 @@ def friction() -> Surface:
 
 @cache
 def friction_file() -> Path:
-    path = live.folder() / "VirtualTire_friction.fmu"
-    return build_virtual(path, samples_per_step=10, surface=friction_surface())
+    name, surface = "VirtualTire_friction.fmu", friction_surface()
+
+    def build(place: Path) -> None:
+        build_virtual(place / name, samples_per_step=10, surface=surface)
+
+    return once(f"fmu_{name}", build) / name
 
 
 @cache
 def file(samples: int, *, python: bool = False) -> Path:
     name = f"VirtualTire_{samples}{'_python' if python else ''}.fmu"
-    return build_virtual(live.folder() / name, samples_per_step=samples, python=python)
+
+    def build(place: Path) -> None:
+        build_virtual(place / name, samples_per_step=samples, python=python)
+
+    return once(f"fmu_{name}", build) / name
 
 
 def hold_against_rig(

@@ -4,9 +4,10 @@ import ctypes
 
 import pytest
 
-from tests.native.core import compiled
+from tests.native.core import compiled, loaded
+from tests.once import once
 
 
 @pytest.fixture(scope="session")
-def core(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
-    return compiled(tmp_path_factory.mktemp("core"))
+def core() -> ctypes.CDLL:
+    return loaded(once("core", compiled))

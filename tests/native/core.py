@@ -25,12 +25,11 @@ SCALARS, BY_GAGE = TURN_SCALARS, FEATURE_ROWS
 NativeTurn, NativeFeatures = TurnStruct, FeatureStruct
 
 
-def compiled(folder: Path, *flags: str) -> c.CDLL:
+def compiled(folder: Path) -> None:
     """Compile the core; skip without a C compiler."""
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
         pytest.skip("no C compiler on this machine")
-    library = folder / "core.so"
     sources = sorted(map(str, SOURCE.glob("*.c")))
     command = [
         compiler,
@@ -38,14 +37,17 @@ def compiled(folder: Path, *flags: str) -> c.CDLL:
         "-O2",
         "-shared",
         "-fPIC",
-        *flags,
         *sources,
         "-lm",
         "-o",
-        str(library),
+        str(folder / "core.so"),
     ]
     subprocess.run(command, check=True)
-    core = c.CDLL(str(library))
+
+
+def loaded(folder: Path) -> c.CDLL:
+    """Return the core that was compiled into a folder."""
+    core = c.CDLL(str(folder / "core.so"))
     core.cutter_size.restype = c.c_size_t
     core.cutter_size.argtypes = [c.c_int, REAL]
     core.cutter_start.restype = c.c_void_p

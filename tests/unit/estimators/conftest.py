@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 
+from tests import trained as cornering_tire
 from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import Campaign, read_campaign
-from tirelib.estimators.train import Trained, train
-from tirelib.measured.observations import Observations, observe
+from tirelib.estimators.train import Trained
+from tirelib.measured.observations import Observations
 
 
 @pytest.fixture(scope="session")
-def cornering(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
-    return read_campaign(write(tmp_path_factory.mktemp("c") / "set1", cornering_runs()))
+def cornering() -> Campaign:
+    return read_campaign(cornering_tire.campaign_folder())
 
 
 @pytest.fixture(scope="session")
@@ -48,10 +49,10 @@ def braking(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
 
 
 @pytest.fixture(scope="session")
-def observed(cornering: Campaign) -> Observations:
-    return observe([cornering])
+def observed() -> Observations:
+    return cornering_tire.observed_and_trained()[0]
 
 
 @pytest.fixture(scope="session")
-def trained(observed: Observations) -> Trained:
-    return train(observed)
+def trained() -> Trained:
+    return cornering_tire.observed_and_trained()[1]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from tests.once import once, value_once
 from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import Campaign, Run, read_campaign
 from tirelib.estimators.calibrate import calibrate_chain
@@ -81,15 +82,19 @@ class World:
 
 
 @pytest.fixture(scope="session")
-def world(tmp_path_factory: pytest.TempPathFactory) -> World:
-    folder = tmp_path_factory.mktemp("report")
+def world() -> World:
+    return value_once("report_world", made_world)
+
+
+def made_world() -> World:
     runs = {
         "set1": [run for run in cornering_runs() if run.plan.load in (1500.0, 4500.0, 7500.0)],
         "set2": camber_runs(),
         "brake_drive": braking_runs(),
         "set3": speed_runs(),
     }
-    campaigns = {k: read_campaign(write(folder / k, v, name=k)) for k, v in runs.items()}
+    folder = once("report", lambda at: [write(at / k, v, name=k) for k, v in runs.items()])
+    campaigns = {name: read_campaign(folder / name) for name in runs}
     seen = {name: observe([campaign]) for name, campaign in campaigns.items()}
     together = observe([campaigns[name] for name in ("set1", "set2", "brake_drive")])
     with pytest.MonkeyPatch.context() as patch:

@@ -1,0 +1,50 @@
+"""What takes long to make is made by one process of a test run, and read by all of them."""
+
+import fcntl
+import os
+import pickle
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+
+PLACE = "TIRELIB_TESTS_ONCE"
+"""Environment variable with the folder that the processes of a run share."""
+MADE: list[Path] = []
+"""Folders that this process has filled."""
+Value = TypeVar("Value")
+
+
+def share_a_folder(config: pytest.Config) -> None:
+    """Make the folder of a run; the processes that this one starts find it."""
+    if PLACE not in os.environ:
+        os.environ[PLACE] = tempfile.mkdtemp(prefix="tirelib_once_")
+        config.add_cleanup(lambda: shutil.rmtree(os.environ.pop(PLACE), ignore_errors=True))
+
+
+def once(name: str, fill: Callable[[Path], object]) -> Path:
+    """Return a folder that the first process to ask for it fills, while the others wait."""
+    folder = Path(os.environ[PLACE]) / name
+    filled = folder.with_name(f"{name}.filled")
+    with folder.with_name(f"{name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not filled.exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir()
+            fill(folder)
+            filled.touch()
+            MADE.append(folder)
+    return folder
+
+
+def value_once(name: str, make: Callable[[], Value]) -> Value:
+    """Return what the first process to ask for it has made, read back from its file."""
+
+    def fill(folder: Path) -> None:
+        (folder / "value.pickle").write_bytes(pickle.dumps(make()))
+
+    found: Value = pickle.loads((once(name, fill) / "value.pickle").read_bytes())
+    return found
