@@ -22,9 +22,10 @@ from proof.tires import tire as random_tire
 from tirelib.campaign import read_campaign
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.threads import one_thread
-from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.edge import EDGE_UNIT
+from tirelib.estimators.estimate import Estimates
 from tirelib.estimators.result import TRUTH
 from tirelib.estimators.train import train
 from tirelib.estimators.unknowns import DEPTH, FRICTION, TWO_SIGMA

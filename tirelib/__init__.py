@@ -19,6 +19,8 @@ is quick:
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from tirelib.core.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from tirelib.campaign import check_campaign, read_campaign
     from tirelib.campaign.importing.importer import import_campaign
@@ -32,7 +34,6 @@ if TYPE_CHECKING:
     from tirelib.stream import StreamEstimator
     from tirelib.tables import candidate_table, estimate_table, feature_table, parameter_table
 
-__version__ = "0.1.0"
 __all__ = [
     "StreamEstimator",
     "add",

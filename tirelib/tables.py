@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tirelib.core.parameters import TireFile
-    from tirelib.estimators.calibration import Estimates
+    from tirelib.estimators.estimate import Estimates
     from tirelib.inference.diagnose.document import Assessment
     from tirelib.inference.diagnose.forces.assess import ForceAssessment
     from tirelib.measured.observations import Observations

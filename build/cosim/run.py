@@ -41,9 +41,9 @@ from cosim.manoeuvres import MANOEUVRES
 from cosim.recording import STEP, VEHICLE, Recording, build_fmus, record
 from cosim.score import COVERED, LIMITS, score, turns_of
 from cosim.wheels import WHEELS, FourWheels
-from tirelib import __version__
 from tirelib.cli.progress import progress_bar
 from tirelib.core.threads import one_thread
+from tirelib.core.version import __version__
 from tirelib.rig.campaign import THREADS
 
 ROOT = Path(__file__).parents[2]

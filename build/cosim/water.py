@@ -18,8 +18,9 @@ from cosim.calibrate import CALIBRATION
 from cosim.wheels import PRESSURE
 from tirelib.core.arrays import FloatArray
 from tirelib.core.threads import one_thread
-from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_file import read_calibration
+from tirelib.estimators.estimate import Estimates
 from tirelib.measured.features.extract import extract_features
 from tirelib.measured.signal import LowPass, cut_turns
 from tirelib.rig.laws import WaterWedge

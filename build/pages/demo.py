@@ -17,7 +17,8 @@ from pages.live import LiveFiles, live_drawing, live_table, live_text, read_line
 from pages.turns import TypicalTurns, typical_turns
 from tirelib.campaign import Campaign, RunPlan, read_campaign
 from tirelib.core.errors import CalibrationError
-from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.estimate import Estimates
 from tirelib.estimators.train import Trained, train
 from tirelib.measured.observations import Observations, observe
 from tirelib.measured.signal import LowPass

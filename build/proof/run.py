@@ -22,8 +22,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from proof.case import case
 from proof.tires import CACHE
-from tirelib import __version__
 from tirelib.core.threads import one_thread
+from tirelib.core.version import __version__
 from tirelib.inference.identify.structure import STRUCTURE_STD
 
 TYPICAL = {

@@ -21,8 +21,8 @@ from design import OUT, OUT_FRICTION, limits
 from scipy.interpolate import CubicSpline, RBFInterpolator
 from scipy.optimize import minimize
 
-from tirelib import __version__
 from tirelib.core.threads import one_thread
+from tirelib.core.version import __version__
 from tirelib.fmu.virtual.coordinates import coordinates, half_angle, warped
 from tirelib.fmu.virtual.surface import (
     DEGREE,

@@ -14,7 +14,7 @@ import pytest
 from tirelib.campaign import read_campaign
 from tirelib.cli.limits import outside
 from tirelib.core.flags import TurnFlag
-from tirelib.estimators.calibration import Estimates
+from tirelib.estimators.estimate import Estimates
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained, take, train
 from tirelib.measured.observations import Observations, observe

@@ -8,9 +8,9 @@ import pytest
 from tirelib.campaign import CampaignHeader, TireGeometry
 from tirelib.core.arrays import FloatArray
 from tirelib.estimators.calibrate import calibrate_chain
-from tirelib.estimators.calibration import LARGEST_ANGLE_STD
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.estimate import Estimate
+from tirelib.estimators.gage_chains import LARGEST_ANGLE_STD
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.unknowns import FRICTION, TWO_SIGMA
 from tirelib.fmu.virtual.spec import friction_surface

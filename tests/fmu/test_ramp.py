@@ -13,8 +13,8 @@ from tests.synthetic import waveform
 from tirelib.campaign import CampaignHeader, Run, RunPlan, TireGeometry, write_campaign
 from tirelib.campaign.read import read_campaign
 from tirelib.core.held import HELD
-from tirelib.estimators.calibration import Calibration, Estimates
-from tirelib.estimators.estimate import QUANTITIES
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.estimate import QUANTITIES, Estimates
 from tirelib.estimators.train import train
 from tirelib.fmu.run import LoadedFmu
 from tirelib.fmu.virtual.options import Options

@@ -6,10 +6,10 @@ import numpy as np
 
 from tests.native.core import BY_GAGE, SCALARS, NativeFeatures, NativeTurn
 from tirelib.core.compiled import EstimateStruct
-from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.compiled import NOTES, ROLLING
 from tirelib.estimators.core_table import flat_table
-from tirelib.estimators.estimate import QUANTITIES
+from tirelib.estimators.estimate import QUANTITIES, Estimates
 from tirelib.measured.features.extract import Features
 
 SIZE = {"Fz": 1e2, "alpha": 1e-2, "kappa": 1e-2, "Fy": 1e2}

@@ -17,8 +17,8 @@ from tests.synthetic import LATERAL, frames
 from tirelib.core.compiled import Core, loaded_core
 from tirelib.core.errors import FormatError, ParameterError, ShapeError
 from tirelib.core.held import HELD
-from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.compiled import core_calibration
+from tirelib.estimators.estimate import Estimates
 from tirelib.measured.features import (
     Features,
     RecordReader,

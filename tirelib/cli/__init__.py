@@ -10,9 +10,9 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from tirelib import __version__
 from tirelib.core.errors import TirelibError
 from tirelib.core.threads import bound_process
+from tirelib.core.version import __version__
 
 VERBS = {
     "campaign": "Validate a folder of measurements, or show its content.",

@@ -11,7 +11,6 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from tirelib import __version__
 from tirelib.campaign import Campaign, read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
@@ -25,6 +24,7 @@ from tirelib.cli.limits import not_checked, not_given
 from tirelib.cli.options import json_option, low_pass_options
 from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.core.errors import CalibrationError
+from tirelib.core.version import __version__
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.costs import costs_of
 from tirelib.estimators.crossval import (

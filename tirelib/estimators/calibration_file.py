@@ -19,9 +19,10 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import FormatError
 from tirelib.estimators.angle_model import AngleModel
 from tirelib.estimators.border import Border
-from tirelib.estimators.calibration import Calibration, Rolling
+from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.calibration_check import BORDER, faults
 from tirelib.estimators.chain import Chain
+from tirelib.estimators.gage_chains import Rolling
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.likeness import Likeness
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, Variable

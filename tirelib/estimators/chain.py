@@ -103,6 +103,14 @@ class Chain:
         model = {"Fz": self.load, "kappa": self.radius, "Fy": self.force, "alpha": self.angle}
         return model[quantity] is not None
 
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """Conditions that its models use, without which they say nothing."""
+        models = [self.load, self.force, self.angle.polynomial if self.angle else None]
+        used = {v.name for model in models if model is not None for v in model.variables}
+        sources = {"pressure": "pressure", "camber": "camber", "speed_squared": "speed"}
+        return tuple(source for name, source in sources.items() if name in used)
+
     def conditions_allowed(self, values: Mapping[str, FloatArray]) -> dict[str, BoolArray]:
         """Tell for pressure, speed and camber which turns the calibration holds for.
 

@@ -18,9 +18,9 @@ from tirelib.core.compiled import (
     memory,
 )
 from tirelib.core.errors import FormatError
-from tirelib.estimators.calibration import Calibration, Estimates
 from tirelib.estimators.core_table import flat_table
-from tirelib.estimators.estimate import QUANTITIES
+from tirelib.estimators.estimate import QUANTITIES, Estimates
+from tirelib.estimators.gage_chains import GageChains
 from tirelib.measured.features.extract import Features
 
 NOTES = (
@@ -44,7 +44,7 @@ class CoreCalibration:
     Parameters
     ----------
     core : Core
-    calibration : Calibration
+    calibration : GageChains
 
     Raises
     ------
@@ -52,7 +52,7 @@ class CoreCalibration:
         If the core does not know a regressor of the calibration.
     """
 
-    def __init__(self, core: Core, calibration: Calibration) -> None:
+    def __init__(self, core: Core, calibration: GageChains) -> None:
         self.core, self.gages = core, len(calibration.lateral)
         self._table = flat_table(calibration)
         self._memory = memory(core.calibration_size())
@@ -65,7 +65,7 @@ class CoreCalibration:
             )
 
     def estimate(self, features: Features) -> Estimates:
-        """Estimate every turn; as `Calibration.estimate`."""
+        """Estimate every turn; as `GageChains.reference_estimate`."""
         n = len(features)
         size = min(n, BLOCK)
         turns, given = block_of(TurnStruct, size), block_of(FeatureStruct, size)
@@ -113,10 +113,10 @@ def _notes(bits: int) -> tuple[str, ...]:
     return tuple(name for number, name in enumerate(NOTES) if bits & 1 << number)
 
 
-_known: OrderedDict[int, tuple[Calibration, CoreCalibration | None]] = OrderedDict()
+_known: OrderedDict[int, tuple[GageChains, CoreCalibration | None]] = OrderedDict()
 
 
-def core_calibration(calibration: Calibration) -> CoreCalibration | None:
+def core_calibration(calibration: GageChains) -> CoreCalibration | None:
     """Return a calibration as the core has it; None where numpy has to compute.
 
     That is where there is no core for this machine, or the calibration has a regressor, or more of

@@ -12,7 +12,8 @@ import numpy as np
 
 from tirelib.campaign.recording import Block, Recording, Wheel, blocks
 from tirelib.core.arrays import FloatArray
-from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.estimate import Estimates
 from tirelib.measured.features.extract import Features, extract_features
 from tirelib.measured.signal import LowPass, Turn, TurnCutter, Turns, stack_turns
 

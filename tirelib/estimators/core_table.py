@@ -16,9 +16,9 @@ from tirelib.core.errors import FormatError
 from tirelib.estimators import (
     angle_model,
     any_road,
-    calibration,
     contact_length,
     doubt,
+    gage_chains,
     laws,
     likeness,
     pulled,
@@ -27,9 +27,9 @@ from tirelib.estimators import (
     tilt,
     unknowns,
 )
-from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.estimate import QUANTITIES
+from tirelib.estimators.gage_chains import GageChains
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, Term, Variable
 
 MAGIC, VERSION = 20220117.0, 2.0
@@ -62,7 +62,7 @@ CONSTANTS = (
     tilt.LEAST_LOAD,
     *(likeness.ROAD_DOUBT, likeness.PRESSURE_DOUBT, likeness.SPEED_DOUBT),
     likeness.ROAD_DRIFT["angle_slope"][1],
-    *(angle_model.WIDEST, doubt.ANGLE_STEP, calibration.LARGEST_ANGLE_STD),
+    *(angle_model.WIDEST, doubt.ANGLE_STEP, gage_chains.LARGEST_ANGLE_STD),
     *(contact_length.BIAS, contact_length.MIDDLE, contact_length.WIDTH),
     *(contact_length.LEAST_STD, contact_length.SHORT_STD, contact_length.SHORT_WIDTH),
 )
@@ -71,7 +71,7 @@ VARIABLES, TERMS, NAMES, NODES, WHOLE = 32, 256, 24, 64, 6
 """Sizes that the core was compiled with, in ``calibration.h``."""
 
 
-def flat_table(known: Calibration) -> FloatArray:
+def flat_table(known: GageChains) -> FloatArray:
     """Return the table of a calibration, shape (n,).
 
     Raises
@@ -114,12 +114,11 @@ def _chain(part: Chain, lateral: FloatArray) -> Iterator[float]:
     places = tuple((lateral[list(part.gages)] / np.abs(lateral).max()).tolist())
     camber = [guard for guard in part.guards["Fy"] if guard.name == "camber"]
     widest = [guard.high for guard in part.guards["alpha"] if guard.name == "alpha"]
-    needed = calibration._needed(part)
     yield from (float(len(part.gages)), *map(float, part.gages))
     yield from regressors._fitted(places, 1).ravel().tolist()
     for degree in (2, 3, 4):
         yield from regressors._fitted(places, degree)[degree].tolist()
-    yield from (float(name in needed) for name in ("pressure", "camber", "speed"))
+    yield from (float(name in part.needed) for name in ("pressure", "camber", "speed"))
     yield from (_uses(part.force, "camber"), _uses(part.radius, "load"))
     yield from (part.mean_load, part._load_per_hardening(), max(widest or [angle_model.WIDEST]))
     yield from (camber[0].low, camber[0].high) if camber else (np.nan, np.nan)

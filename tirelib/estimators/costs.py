@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.chain import Chain
-from tirelib.estimators.estimate import QUANTITIES
+from tirelib.estimators.estimate import QUANTITIES, Estimates
 from tirelib.measured.features.extract import Features
 
 COLUMN = {

@@ -8,9 +8,9 @@ import numpy as np
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import CalibrationError
 from tirelib.estimators.calibrate import calibrate_chain
-from tirelib.estimators.calibration import LARGEST_ANGLE_STD
 from tirelib.estimators.dissertation import FREE, SMALL_ANGLE, UPRIGHT, Means
 from tirelib.estimators.fit import LARGEST_LEVEL
+from tirelib.estimators.gage_chains import LARGEST_ANGLE_STD
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.train import Trained, take
 from tirelib.measured.observations import Observations, mean_by

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 
 QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
 
@@ -34,3 +34,41 @@ class Estimate:
     def widened(self, more: FloatArray) -> "Estimate":
         """Return it with a further standard deviation; valid only where that is a number."""
         return replace(self, std=np.hypot(self.std, more), valid=self.valid & np.isfinite(more))
+
+
+@dataclass(frozen=True, slots=True)
+class Estimates:
+    """Estimates of n turns, SI, ISO 8855.
+
+    Attributes
+    ----------
+    value, std : dict of arrays, shape (n,)
+        For each of Fz, alpha, kappa, Fy; NaN where not calibrated or not to be had.
+    valid : dict of bool arrays, shape (n,)
+        Whether each quantity may be used.
+    turn_valid : bool array, shape (n,)
+        The turn was measured well and every calibrated quantity lies in its calibrated range.
+    flags : int array, shape (n,)
+        `TurnFlag` bits.
+    notes : tuple of n tuples of str
+        Which quantity is out of range or saturated, which condition was not calibrated, cannot be,
+        or decides on the standard deviation because nobody gave it.
+    rolling : tuple of str, length n
+        ``free``, ``braking``, ``driving`` or ``unknown``, from CP1 against CP2.
+    radius : array, shape (n,), [m]
+        Effective rolling radius.
+    contact_length, contact_length_std : arrays, shape (n, n_gages), [m]
+        Corrected for the bias of the reading; what is read is `Features.contact_angle` times the
+        radius.
+    """
+
+    value: dict[str, FloatArray]
+    std: dict[str, FloatArray]
+    valid: dict[str, BoolArray]
+    turn_valid: BoolArray
+    flags: IntArray
+    notes: tuple[tuple[str, ...], ...]
+    rolling: tuple[str, ...]
+    radius: FloatArray
+    contact_length: FloatArray
+    contact_length_std: FloatArray

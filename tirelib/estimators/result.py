@@ -10,11 +10,11 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.flags import TurnFlag, flag_names
-from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.costs import COLUMN, Cost
 from tirelib.estimators.edge import EDGE_UNIT, FORMAT, VARIED
-from tirelib.estimators.estimate import QUANTITIES
+from tirelib.estimators.estimate import QUANTITIES, Estimates
 from tirelib.estimators.likeness import suspected
 from tirelib.measured.features.extract import Features
 from tirelib.measured.observations import Observations, mean_by

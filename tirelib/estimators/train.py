@@ -9,9 +9,10 @@ from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import CalibrationError
 from tirelib.core.threads import one_thread
 from tirelib.estimators.calibrate import calibrate_chain, measured
-from tirelib.estimators.calibration import Calibration, Rolling
+from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.cornering import CorneringTrend, cornering_trend
 from tirelib.estimators.dissertation import Means, Regression, fit_all, means_for_tables
+from tirelib.estimators.gage_chains import Rolling
 from tirelib.estimators.links import Links
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.measured.observations import Observations, geometry_of, mean_by

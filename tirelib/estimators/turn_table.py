@@ -9,13 +9,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from tirelib import __version__
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.documents import new_file
 from tirelib.core.flags import flag_names
-from tirelib.estimators.calibration import Estimates
+from tirelib.core.version import __version__
 from tirelib.estimators.edge import EDGE_UNIT
-from tirelib.estimators.estimate import QUANTITIES
+from tirelib.estimators.estimate import QUANTITIES, Estimates
 from tirelib.measured.features.extract import Features
 from tirelib.measured.signal.quality import UNUSABLE
 

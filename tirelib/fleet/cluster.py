@@ -10,8 +10,8 @@ import dask.config
 from distributed import Client, LocalCluster
 from distributed.utils import silence_logging_cmgr
 
-from tirelib import __version__
 from tirelib.core.errors import FormatError
+from tirelib.core.version import __version__
 
 CONNECT = 20.0
 """Time in which a scheduler must answer, [s]: one that is started at the same moment answers after

@@ -13,8 +13,8 @@ import pyarrow.dataset as pads
 from distributed import Client, Future, as_completed
 from distributed.comm.core import CommClosedError
 
-from tirelib import __version__
 from tirelib.core.errors import FormatError, ParameterError, TirelibError
+from tirelib.core.version import __version__
 from tirelib.fleet.dataset import ALSO_AS, ALSO_AT, DataSet, Finished, Rows
 from tirelib.fleet.rows import Row
 from tirelib.fleet.sources import Source, fingerprint

@@ -9,9 +9,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from tirelib import __version__
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.flags import flag_names
+from tirelib.core.version import __version__
 from tirelib.fleet.tables import SCHEMAS
 from tirelib.measured.features.table import PER_TURN
 from tirelib.measured.features.table import units as units_of_features

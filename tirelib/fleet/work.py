@@ -19,7 +19,6 @@ from hashlib import sha256
 from pathlib import Path
 from threading import Lock
 
-from tirelib import __version__
 from tirelib.campaign.header import parse_header
 from tirelib.campaign.mdf import started_at
 from tirelib.campaign.plan import parse_plans
@@ -27,6 +26,7 @@ from tirelib.campaign.problem import Problem, errors_of
 from tirelib.campaign.recording import FILE as RECORDING
 from tirelib.campaign.recording import read_recording
 from tirelib.core.errors import FormatError, TirelibError
+from tirelib.core.version import __version__
 from tirelib.fleet.dataset import HEAD, DataSet, now
 from tirelib.fleet.rows import Channels, Row, every, result_rows
 from tirelib.fleet.sources import Source, content_hash, fetched

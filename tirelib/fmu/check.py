@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib import __version__
 from tirelib.core.errors import FormatError
+from tirelib.core.version import __version__
 from tirelib.fmu.reference import FOLDER, TOLERANCE
 
 FORMAT = "tirelib-fmu-check/1"

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from xml.etree import ElementTree as Xml
 
-from tirelib import __version__
+from tirelib.core.version import __version__
 from tirelib.fmu.describe import TYPES, UNITS
 from tirelib.fmu.variables import Variable
 

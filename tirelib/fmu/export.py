@@ -11,8 +11,8 @@ from importlib import metadata
 from pathlib import Path
 from types import ModuleType
 
-from tirelib import __version__
 from tirelib.core.errors import FormatError
+from tirelib.core.version import __version__
 from tirelib.fmu.bundle import BROUGHT, collect, write_package
 from tirelib.fmu.parts import check_writable, identity_of, source_file, write_fmu
 from tirelib.fmu.spec import SlaveSpec

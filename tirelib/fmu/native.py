@@ -13,9 +13,9 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from tirelib import __version__
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import FormatError
+from tirelib.core.version import __version__
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.core_table import flat_table
 from tirelib.fmu.describe3 import build_description, flat_names, model_description

@@ -11,9 +11,9 @@ from importlib import metadata
 from pathlib import Path
 from uuid import UUID, uuid5
 
-from tirelib import __version__
 from tirelib.core.compiled import shipped
 from tirelib.core.errors import FormatError
+from tirelib.core.version import __version__
 from tirelib.fmu.bundle import content_hash
 from tirelib.fmu.describe import described, repack
 from tirelib.fmu.spec import SlaveSpec

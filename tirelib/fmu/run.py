@@ -16,8 +16,8 @@ from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import CalibrationError, FormatError
 from tirelib.core.flags import INVALIDATING, flag_names
 from tirelib.core.held import HELD
-from tirelib.estimators.calibration import Calibration, Estimates
-from tirelib.estimators.estimate import QUANTITIES
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.estimate import QUANTITIES, Estimates
 from tirelib.fmu.build import embedded_calibration
 from tirelib.measured.features.extract import Features
 from tirelib.measured.observations import SET_POINTS, TRUTH, Observations, geometry_of, truth_of

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
-from tirelib.estimators.calibration import Estimates
+from tirelib.estimators.estimate import Estimates
 from tirelib.measured.observations import Observations, mean_by
 
 QUANTITIES = ("Fz", "alpha", "kappa", "Fy")

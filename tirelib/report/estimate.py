@@ -5,7 +5,8 @@ from math import isnan
 from pathlib import Path
 
 from tirelib.core.flags import flag_names
-from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.estimate import Estimates
 from tirelib.measured.observations import Observations
 from tirelib.report import figures
 from tirelib.report.accuracy import QUANTITIES, TITLE, Accuracy, accuracies

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from tirelib import __version__
 from tirelib.core.errors import TirelibError
+from tirelib.core.version import __version__
 from tirelib.report.style import AXES_NAME, save
 
 DASH = "\N{EN DASH}"

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tirelib.estimators.calibration import Estimates
+from tirelib.estimators.estimate import Estimates
 from tirelib.measured.features.extract import Features
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tirelib.core.errors import FormatError
-from tirelib.estimators.calibration import Estimates
+from tirelib.estimators.estimate import Estimates
 from tirelib.measured.features.extract import Features
 from tirelib.measured.signal.contacts import Contact, ContactFinder
 from tirelib.measured.signal.lowpass import LowPass

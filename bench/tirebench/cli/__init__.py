@@ -3,9 +3,9 @@
 import click
 
 from tirebench.errors import BenchError
-from tirelib import __version__
 from tirelib.cli import Verbs, run_program
 from tirelib.core.errors import TirelibError
+from tirelib.core.version import __version__
 
 VERBS = {
     "ports": "List serial ports: device, description, identity.",

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
-from tirelib.estimators.calibration import Estimates
+from tirelib.estimators.estimate import Estimates
 from tirelib.estimators.train import averaging
 from tirelib.measured.observations import Observations
 from tirelib.report.levels import angle_levels, load_levels, reference_level

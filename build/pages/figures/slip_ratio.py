@@ -5,7 +5,8 @@ from matplotlib.figure import Figure
 
 from pages.figures.strain import figure_4_17_turns
 from pages.turns import TypicalTurns
-from tirelib.estimators.calibration import Estimates, Rolling
+from tirelib.estimators.estimate import Estimates
+from tirelib.estimators.gage_chains import Rolling
 from tirelib.estimators.regressors import compute_regressors
 from tirelib.measured.observations import Observations
 from tirelib.report.accuracy import WIDTH, accuracy, compare

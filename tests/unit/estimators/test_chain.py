@@ -10,10 +10,10 @@ from tests.synthetic import LATERAL, cornering_runs, header, synthetic_run, writ
 from tirelib.campaign import Campaign, read_campaign
 from tirelib.core.errors import CalibrationError
 from tirelib.core.flags import TurnFlag
-from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.contact_length import contact_lengths
 from tirelib.estimators.dissertation import fit_all
+from tirelib.estimators.estimate import Estimates
 from tirelib.estimators.result import estimate_document
 from tirelib.estimators.train import Trained, take, train
 from tirelib.measured.features import Features

@@ -14,9 +14,9 @@ from tirelib.cli.limits import weakly_checked
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
 from tirelib.core.flags import TurnFlag
-from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
 from tirelib.estimators.doubt import ANGLE_STEP, with_moved
+from tirelib.estimators.estimate import Estimates
 from tirelib.estimators.likeness import DRIFT, ROAD_DRIFT, suspected
 from tirelib.estimators.mixed import strangers
 from tirelib.estimators.regressors import ODD, compute_regressors

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from tirelib.core.arrays import FloatArray
 from tirelib.core.flags import TurnFlag
 from tirelib.estimators.any_road import Seen, tell
-from tirelib.estimators.calibration import LARGEST_ANGLE_STD
 from tirelib.estimators.fit_sliding import Runs, fit_sliding
+from tirelib.estimators.gage_chains import LARGEST_ANGLE_STD
 from tirelib.estimators.sliding import SlidingCurve, Told
 from tirelib.estimators.train import Trained
 from tirelib.estimators.unknowns import (

@@ -10,8 +10,8 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.calibration_file import read_calibration, write_calibration
+from tirelib.estimators.estimate import Estimates
 from tirelib.estimators.polynomial import Cloud, Polynomial, Variable
 from tirelib.estimators.ranges import AROUND, MIRRORED, REACH, with_ranges
 from tirelib.estimators.regressors import SHAPE

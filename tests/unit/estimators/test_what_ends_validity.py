@@ -8,8 +8,8 @@ import pytest
 
 from tests.synthetic import header, synthetic_run
 from tirelib.core.flags import TurnFlag
-from tirelib.estimators.calibration import Calibration, Estimates
-from tirelib.estimators.estimate import QUANTITIES
+from tirelib.estimators.calibration import Calibration
+from tirelib.estimators.estimate import QUANTITIES, Estimates
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Range
 from tirelib.estimators.train import Trained

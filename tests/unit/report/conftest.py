@@ -10,8 +10,9 @@ from tests.once import once, value_once
 from tests.synthetic import cornering_runs, synthetic_run, write
 from tirelib.campaign import Campaign, Run, read_campaign
 from tirelib.estimators.calibrate import calibrate_chain
-from tirelib.estimators.calibration import Calibration, Estimates
+from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.chain import Chain
+from tirelib.estimators.estimate import Estimates
 from tirelib.estimators.links import Links
 from tirelib.estimators.train import Trained, train
 from tirelib.measured.observations import Observations, observe

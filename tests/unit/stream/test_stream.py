@@ -16,7 +16,7 @@ from tests.synthetic import LATERAL, frames
 from tirelib.campaign import conditions_of, read_campaign
 from tirelib.core.errors import CalibrationError, ParameterError, ShapeError
 from tirelib.core.flags import TurnFlag, flag_names
-from tirelib.estimators.calibration import Estimates
+from tirelib.estimators.estimate import Estimates
 from tirelib.measured.features import Features, extract_features
 from tirelib.measured.observations import measure_run
 from tirelib.measured.signal import LowPass, cut_turns

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.unit.studio.conftest import RUNNER, Served, until
-from tirelib import __version__
+from tirelib.core.version import __version__
 from tirelib.studio.desk import Desk
 from tirelib.studio.jobs import AT_ONCE, Jobs, Progress
 from tirelib.studio.session import Session

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from tirelib import __version__
 from tirelib.core.errors import FormatError
 from tirelib.core.parameters import NUMBERS, Number, TireFile
 from tirelib.core.parameters.tire import range_fault
+from tirelib.core.version import __version__
 from tirelib.inference.diagnose.held_out import pooled
 from tirelib.inference.diagnose.told import strength_told
 from tirelib.inference.extend.extension import Extension

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from tirelib import __version__
 from tirelib.campaign import Campaign, CampaignHeader
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.core.parameters import FIELDS, Number, TireFile
 from tirelib.core.threads import one_thread
 from tirelib.core.units import from_si
+from tirelib.core.version import __version__
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.inference.identify.discrepancy import COARSE, Discrepancy
 from tirelib.inference.identify.estimate import Estimate

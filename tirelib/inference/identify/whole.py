@@ -4,11 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from tirelib import __version__
 from tirelib.campaign import Campaign
 from tirelib.core.errors import CalibrationError, TirelibError
 from tirelib.core.parameters import Number, Tire, TireFile
 from tirelib.core.threads import one_thread
+from tirelib.core.version import __version__
 from tirelib.inference.identify.brush_model import STORED
 from tirelib.inference.identify.document import model_file
 from tirelib.inference.identify.forces import ForceIdentification, identify_forces

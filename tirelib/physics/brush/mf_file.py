@@ -7,8 +7,8 @@ ISO 8855 (TYDEX W).
 
 from collections.abc import Sequence
 
-from tirelib import __version__
 from tirelib.core.units import from_si
+from tirelib.core.version import __version__
 from tirelib.physics.brush.mf_fit import MagicFit
 from tirelib.physics.brush.mf_tire import LIMITS
 from tirelib.physics.brush.tir import TirEntry, TirFile, TirLine, TirSection

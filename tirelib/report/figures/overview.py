@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tirelib.estimators.calibration import Estimates
+from tirelib.estimators.estimate import Estimates
 from tirelib.measured.observations import Observations
 from tirelib.report.accuracy import (
     QUANTITIES,

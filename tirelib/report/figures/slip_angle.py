@@ -4,8 +4,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tirelib.core.errors import CalibrationError
-from tirelib.estimators.calibration import Estimates
 from tirelib.estimators.dissertation import Regression
+from tirelib.estimators.estimate import Estimates
 from tirelib.estimators.train import Trained
 from tirelib.measured.observations import Observations
 from tirelib.report.accuracy import WIDTH
