@@ -1,6 +1,6 @@
 """Half and double of the numbers of `tirelib export`, on made-up tires of the brush.
 
-Prints one table for each constant of `tirelib.physics.brush.mf_fit` and
+Prints one table for each constant of `tirelib.inference.magic.fit` and
 `tirelib.inference.compare.magic_points`: the error that it admits, or the error of the fitted Magic
 Formula against the brush, at half of it, at itself and at double. Takes two minutes:
 ``.venv/bin/python build/export_constants.py``.
@@ -19,9 +19,9 @@ from tirelib.core.parameters import Number, TireFile
 from tirelib.core.threads import one_thread
 from tirelib.inference.compare import magic_points
 from tirelib.inference.compare.force_model import ForceModel, force_model_of
-from tirelib.physics.brush import mf_fit
+from tirelib.inference.magic import fit as magic_fit
+from tirelib.inference.magic.fit import MagicPoints, fit_magic
 from tirelib.physics.brush.mf import magic_forces
-from tirelib.physics.brush.mf_fit import MagicPoints, fit_magic
 
 TIRES = 8
 RANGE = {"slip_angle": 0.2, "slip_ratio": 0.15, "speed": 16.0, "radius": 0.32}
@@ -85,7 +85,7 @@ def shown(name: str, tried: dict[str, list[float]]) -> None:
 
 def pure(models: list[ForceModel]) -> None:
     """Show by how much the other slip changes a force, where it counts as none."""
-    alpha, kappa = mf_fit.PURE_ANGLE, mf_fit.PURE_RATIO
+    alpha, kappa = magic_fit.PURE_ANGLE, magic_fit.PURE_RATIO
     own = np.concatenate([-np.geomspace(0.005, 0.2, 20), np.geomspace(0.005, 0.2, 20)])
 
     def loss(model: ForceModel, force: str, other: float) -> float:
@@ -137,7 +137,7 @@ def main() -> None:
     for each in (1, 2, 4):
         rng = np.random.default_rng(0)
         few = [taken(p, np.sort(rng.permutation(p.load.size)[: 12 * each])) for p in side]
-        with changed(mf_fit, POINTS_PER_COEFFICIENT=1):
+        with changed(magic_fit, POINTS_PER_COEFFICIENT=1):
             tried[str(each)] = [
                 error(noisy(a, k), b) for k, (a, b) in enumerate(zip(few, side, strict=True))
             ]
@@ -146,7 +146,7 @@ def main() -> None:
     for ratio in (1.025, 1.05, 1.1):
         near = upright(models, LOADS=(1.0, 0.5 * (1.0 + ratio), ratio))
         for what, limit in (("fitted", 1.0), ("not fitted", 9.0)):
-            with changed(mf_fit, VARIED=limit):
+            with changed(magic_fit, VARIED=limit):
                 tried[f"{ratio} {what}"] = [error(noisy(p, k), p) for k, p in enumerate(near)]
     shown("VARIED: error of Fy with and without coefficients of load, noise of 1 %", tried)
     asked = made(models, LOADS=(0.3, 0.6, 0.9, 1.1, 1.4, 1.7), PRESSURES=(0.9, 1.1))

@@ -5,10 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from tests.unit.brush.test_mf import HEAD, PLAIN
+from tirelib.core.parameters.tir import parse_tir
 from tirelib.inference.identify.force_data import ForceData
+from tirelib.inference.magic.file import magic_tire
 from tirelib.physics.brush.mf import magic_forces
-from tirelib.physics.brush.mf_tire import MagicTire, magic_tire
-from tirelib.physics.brush.tir import parse_tir
+from tirelib.physics.brush.mf_tire import MagicTire
 
 LOADS = (1500.0, 3000.0, 4500.0, 6000.0)
 ANGLES = tuple(np.radians(np.arange(-6.0, 6.1, 1.0)))

@@ -13,7 +13,7 @@ from tirelib.core.units import to_si
 
 if TYPE_CHECKING:
     from tirelib.core.parameters import TireFile
-    from tirelib.physics.brush.mf_fit import MagicFit
+    from tirelib.inference.magic.fit import MagicFit
 
 FORMAT = "tirelib-export/1"
 
@@ -81,12 +81,12 @@ def export(
     """Fit a Magic Formula 6.1 to a model's brush or to a force campaign, and write it as .tir."""
     from tirelib.campaign import read_campaign
     from tirelib.core.parameters import read_tire
+    from tirelib.core.parameters.tir import write_tir
     from tirelib.inference.compare.force_model import force_model_of
     from tirelib.inference.compare.magic_points import campaign_points, model_points
+    from tirelib.inference.magic.file import tir_of, words
+    from tirelib.inference.magic.fit import fit_magic
     from tirelib.model.registration import registered_effects
-    from tirelib.physics.brush.mf_file import tir_of, words
-    from tirelib.physics.brush.mf_fit import fit_magic
-    from tirelib.physics.brush.tir import write_tir
 
     given = None if radius is None else to_si(radius, "mm", "length")
     if Path(source).is_dir():

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirelib.core.errors import ParameterError
-from tirelib.physics.brush.magic_formula import fit_sine, lateral_curve, sine_curve
+from tirelib.inference.magic.sine import fit_sine
+from tirelib.physics.brush.magic_formula import lateral_curve, sine_curve
 
 TRUE = {"C_alpha": 9e4, "D": 4200.0, "C": 1.4, "E": -0.5, "S_h": 0.002, "S_v": -40.0}
 

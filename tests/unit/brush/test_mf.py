@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from tirelib.core.errors import FormatError, ParameterError, ShapeError
+from tirelib.core.parameters.tir import parse_tir
+from tirelib.inference.magic.file import magic_tire
 from tirelib.physics.brush.mf import magic_forces
-from tirelib.physics.brush.mf_tire import Coefficients, MagicTire, magic_tire
-from tirelib.physics.brush.tir import parse_tir
+from tirelib.physics.brush.mf_tire import Coefficients, MagicTire
 
 HEAD = """[UNITS]
 LENGTH='meter'

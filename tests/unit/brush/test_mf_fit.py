@@ -19,12 +19,13 @@ from tests.unit.force_campaigns import steady_runs, write_forces
 from tirelib.cli import program
 from tirelib.core.errors import CalibrationError, TirelibError
 from tirelib.core.parameters import Number, TireFile, write_tire
+from tirelib.core.parameters.tir import read_tir
 from tirelib.inference.compare.force_model import force_model_of
 from tirelib.inference.compare.magic_points import model_points
+from tirelib.inference.magic.file import magic_tire
+from tirelib.inference.magic.fit import STAGES, MagicFit, MagicPoints, _Fit, fit_magic
 from tirelib.physics.brush.mf import magic_forces
-from tirelib.physics.brush.mf_fit import STAGES, MagicFit, MagicPoints, _Fit, fit_magic
-from tirelib.physics.brush.mf_tire import Coefficients, MagicTire, magic_tire
-from tirelib.physics.brush.tir import read_tir
+from tirelib.physics.brush.mf_tire import Coefficients, MagicTire
 
 TRUTH = {
     name: value

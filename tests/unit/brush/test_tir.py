@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirelib.core.errors import FormatError, ParameterError
-from tirelib.physics.brush.tir import (
+from tirelib.core.parameters.tir import (
     TirEntry,
     TirFile,
     TirLine,
@@ -17,7 +17,7 @@ from tirelib.physics.brush.tir import (
     read_tir,
     write_tir,
 )
-from tirelib.physics.brush.tir_units import BASES, factor, words
+from tirelib.core.parameters.tir_units import BASES, factor, words
 
 UNITS = "LENGTH='meter'\nFORCE='newton'\nANGLE='radians'\nMASS='kg'\nTIME='second'\n"
 TEXT = f"""! invented numbers, no real tire

@@ -11,7 +11,7 @@ from tirelib.core.errors import ParameterError
 from tirelib.inference.compare.force_model import ForceModel
 from tirelib.inference.identify.force_data import ForceData, force_data
 from tirelib.inference.identify.force_points import ForcePoints, force_points
-from tirelib.physics.brush.mf_fit import MagicPoints
+from tirelib.inference.magic.fit import MagicPoints
 from tirelib.physics.brush.predict import PointForces
 
 LOADS = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75)

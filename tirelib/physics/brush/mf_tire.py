@@ -1,4 +1,4 @@
-"""A tire for the steady-state Magic Formula: the coefficients of one .tir file, checked."""
+"""A tire for the steady-state Magic Formula: its coefficients, and the checked inputs of a call."""
 
 import re
 from collections.abc import Mapping
@@ -9,24 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tirelib.core.arrays import BoolArray, FloatArray
-from tirelib.core.errors import FormatError, ParameterError, ShapeError
-from tirelib.physics.brush.tir import TirFile
+from tirelib.core.errors import ParameterError, ShapeError
 
-REQUIRED = ("PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
-"""Without these there is no curve at all; every other absent coefficient is neutral."""
-SECTIONS = (
-    "SCALING_COEFFICIENTS",
-    "LONGITUDINAL_COEFFICIENTS",
-    "LATERAL_COEFFICIENTS",
-    "ALIGNING_COEFFICIENTS",
-    "OVERTURNING_COEFFICIENTS",
-    "ROLLING_COEFFICIENTS",
-    "TURNSLIP_COEFFICIENTS",
-    "VERTICAL",
-    "STRUCTURAL",
-)
-"""Sections whose coefficients are the tire's; all others are the vendor's own."""
-_NAME = re.compile(r"([PQRS])[A-Z]{1,3}\d{1,2}|L[A-Z]{1,6}")
+NAME = re.compile(r"([PQRS])[A-Z]{1,3}\d{1,2}|L[A-Z]{1,6}")
+"""What a coefficient or a scaling factor is called."""
 
 
 class Coefficients:
@@ -38,7 +24,7 @@ class Coefficients:
         self.values = MappingProxyType(dict(values))
 
     def __getattr__(self, name: str) -> float:
-        if not _NAME.fullmatch(name):
+        if not NAME.fullmatch(name):
             raise AttributeError(name)
         neutral = 2.0 if name == "PKY4" else float(name.startswith("L"))
         return self.values.get(name, neutral)
@@ -125,82 +111,7 @@ LIMITS = MappingProxyType(
 )
 
 
-def magic_tire(tire: TirFile) -> MagicTire:
-    """Return the Magic Formula tire of a property file.
-
-    Coefficients come from `SECTIONS` only.
-
-    Raises
-    ------
-    FormatError
-        Naming every missing, contradictory or impossible entry.
-    """
-    problems: list[str] = []
-    values = _coefficients(tire, problems)
-    _check_required(tire, values, problems)
-    problems += _impossible(values)
-
-    def number(key: str) -> float | None:
-        try:
-            return tire.number(key)
-        except ParameterError as error:
-            problems.append(str(error))
-            return None
-
-    found = {key: number(key) for key in ("UNLOADED_RADIUS", "FNOMIN", "NOMPRES", "INFLPRES")}
-    for key in ("UNLOADED_RADIUS", "FNOMIN", "NOMPRES"):
-        value = found[key]
-        if (value is None and key != "NOMPRES") or (value is not None and not value > 0.0):
-            problems.append(f"{key} = {value}; it must be given and > 0")
-    if found["NOMPRES"] is None and any(v != 0.0 for n, v in values.items() if n[:2] == "PP"):
-        problems.append("NOMPRES is missing; the pressure coefficients PP.. refer to it")
-    limits = {}
-    for name, keys in LIMITS.items():
-        low, high = (number(key) for key in keys)
-        if (low, high) != (None, None):
-            limits[name] = (-np.inf if low is None else low, np.inf if high is None else high)
-    if problems:
-        raise FormatError([f"{tire.where}: {problem}" for problem in problems])
-    return MagicTire(
-        tire.fit_type,
-        Coefficients(values),
-        float(found["UNLOADED_RADIUS"] or 0.0),
-        float(found["FNOMIN"] or 0.0),
-        found["NOMPRES"],
-        found["INFLPRES"],
-        MappingProxyType(limits),
-    )
-
-
-def _coefficients(tire: TirFile, problems: list[str]) -> dict[str, float]:
-    """Return the coefficients of the sections that hold the tire's."""
-    found: dict[str, tuple[str, float]] = {}
-    for section in tire.sections:
-        if section.name.upper() not in SECTIONS:
-            continue
-        for entry in section.entries:
-            key = entry.key.upper()
-            if not isinstance(entry.value, float) or not _NAME.fullmatch(key):
-                continue
-            place, value = found.setdefault(key, (section.name, entry.value))
-            if value != entry.value:
-                problems.append(
-                    f"{key} = {value:g} in [{place}] but {entry.value:g} in [{section.name}]; one "
-                    "value is needed; remove the other"
-                )
-    return {key: value for key, (_, value) in found.items()}
-
-
-def _check_required(tire: TirFile, values: Mapping[str, float], problems: list[str]) -> None:
-    for name in REQUIRED:
-        if name in values:
-            continue
-        elsewhere = ", ".join(f"[{section}]" for section, _ in tire.places(name))
-        hint = f"; what {elsewhere} has is not read, [..._COEFFICIENTS] is" if elsewhere else ""
-        problems.append(f"{name} is missing; the Magic Formula needs it{hint}")
-
-
-def _impossible(values: Mapping[str, float]) -> list[str]:
+def impossible(values: Mapping[str, float]) -> list[str]:
     """Return what is wrong with coefficients that the formula divides by."""
     problems = [
         f"{name} = {values[name]:g}; the formula divides by it; it must be > 0, 1 is neutral"
@@ -230,7 +141,7 @@ def check_inputs(
     ParameterError, ShapeError
         If an input is out of what the formula can take, or shapes do not broadcast.
     """
-    if problems := _impossible(tire.coefficients.values):
+    if problems := impossible(tire.coefficients.values):
         raise ParameterError("Magic Formula: " + "; ".join(problems))
     given = {"load": load, "slip_angle": slip_angle, "slip_ratio": slip_ratio, "camber": camber}
     nominal = tire.nominal_pressure

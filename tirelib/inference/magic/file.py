@@ -1,18 +1,36 @@
-"""The property file (.tir) of a fitted Magic Formula 6.1, with its errors and range as comments.
+"""A tire of the Magic Formula from a property file (.tir), and the file of a fitted one.
 
-Every coefficient of the version stands in the file, those that were not fitted with the value that
-changes nothing: other programs differ in what they take an absent one to be. SI units, axes
-ISO 8855 (TYDEX W).
+A written file is of version 6.1 and holds every coefficient of it, those that were not fitted with
+the value that changes nothing: other programs differ in what they take an absent one to be. SI
+units, axes ISO 8855 (TYDEX W); errors and range of the fit are comments.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
+import numpy as np
+
+from tirelib.core.errors import FormatError, ParameterError
+from tirelib.core.parameters.tir import TirEntry, TirFile, TirLine, TirSection
 from tirelib.core.units import from_si
 from tirelib.core.version import __version__
-from tirelib.physics.brush.mf_fit import MagicFit
-from tirelib.physics.brush.mf_tire import LIMITS
-from tirelib.physics.brush.tir import TirEntry, TirFile, TirLine, TirSection
+from tirelib.inference.magic.fit import MagicFit
+from tirelib.physics.brush.mf_tire import LIMITS, NAME, Coefficients, MagicTire, impossible
 
+REQUIRED = ("PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
+"""Without these there is no curve at all; every other absent coefficient is neutral."""
+SECTIONS = (
+    "SCALING_COEFFICIENTS",
+    "LONGITUDINAL_COEFFICIENTS",
+    "LATERAL_COEFFICIENTS",
+    "ALIGNING_COEFFICIENTS",
+    "OVERTURNING_COEFFICIENTS",
+    "ROLLING_COEFFICIENTS",
+    "TURNSLIP_COEFFICIENTS",
+    "VERTICAL",
+    "STRUCTURAL",
+)
+"""Sections whose coefficients are the tire's; all others are the vendor's own."""
 UNITS = {
     "LENGTH": "meter",
     "FORCE": "newton",
@@ -47,6 +65,81 @@ COEFFICIENTS = {
     "QDZ7 QDZ8 QDZ9 QDZ10 QDZ11 QEZ1 QEZ2 QEZ3 QEZ4 QEZ5 QHZ1 QHZ2 QHZ3 QHZ4 SSZ1 SSZ2 SSZ3 SSZ4 "
     "PPZ1 PPZ2",
 }
+
+
+def magic_tire(tire: TirFile) -> MagicTire:
+    """Return the Magic Formula tire of a property file.
+
+    Coefficients come from `SECTIONS` only.
+
+    Raises
+    ------
+    FormatError
+        Naming every missing, contradictory or impossible entry.
+    """
+    problems: list[str] = []
+    values = _coefficients(tire, problems)
+    _check_required(tire, values, problems)
+    problems += impossible(values)
+
+    def number(key: str) -> float | None:
+        try:
+            return tire.number(key)
+        except ParameterError as error:
+            problems.append(str(error))
+            return None
+
+    found = {key: number(key) for key in ("UNLOADED_RADIUS", "FNOMIN", "NOMPRES", "INFLPRES")}
+    for key in ("UNLOADED_RADIUS", "FNOMIN", "NOMPRES"):
+        value = found[key]
+        if (value is None and key != "NOMPRES") or (value is not None and not value > 0.0):
+            problems.append(f"{key} = {value}; it must be given and > 0")
+    if found["NOMPRES"] is None and any(v != 0.0 for n, v in values.items() if n[:2] == "PP"):
+        problems.append("NOMPRES is missing; the pressure coefficients PP.. refer to it")
+    limits = {}
+    for name, keys in LIMITS.items():
+        low, high = (number(key) for key in keys)
+        if (low, high) != (None, None):
+            limits[name] = (-np.inf if low is None else low, np.inf if high is None else high)
+    if problems:
+        raise FormatError([f"{tire.where}: {problem}" for problem in problems])
+    return MagicTire(
+        tire.fit_type,
+        Coefficients(values),
+        float(found["UNLOADED_RADIUS"] or 0.0),
+        float(found["FNOMIN"] or 0.0),
+        found["NOMPRES"],
+        found["INFLPRES"],
+        MappingProxyType(limits),
+    )
+
+
+def _coefficients(tire: TirFile, problems: list[str]) -> dict[str, float]:
+    """Return the coefficients of the sections that hold the tire's."""
+    found: dict[str, tuple[str, float]] = {}
+    for section in tire.sections:
+        if section.name.upper() not in SECTIONS:
+            continue
+        for entry in section.entries:
+            key = entry.key.upper()
+            if not isinstance(entry.value, float) or not NAME.fullmatch(key):
+                continue
+            place, value = found.setdefault(key, (section.name, entry.value))
+            if value != entry.value:
+                problems.append(
+                    f"{key} = {value:g} in [{place}] but {entry.value:g} in [{section.name}]; one "
+                    "value is needed; remove the other"
+                )
+    return {key: value for key, (_, value) in found.items()}
+
+
+def _check_required(tire: TirFile, values: Mapping[str, float], problems: list[str]) -> None:
+    for name in REQUIRED:
+        if name in values:
+            continue
+        elsewhere = ", ".join(f"[{section}]" for section, _ in tire.places(name))
+        hint = f"; what {elsewhere} has is not read, [..._COEFFICIENTS] is" if elsewhere else ""
+        problems.append(f"{name} is missing; the Magic Formula needs it{hint}")
 
 
 def tir_of(fit: MagicFit, source: str) -> TirFile:

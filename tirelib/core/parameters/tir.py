@@ -13,7 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from tirelib.core.errors import FormatError, ParameterError
-from tirelib.physics.brush.tir_units import BASES, POWERS, factor, scale_of, words
+from tirelib.core.parameters.tir_units import BASES, POWERS, factor, scale_of, words
 
 FIT_TYPES = (5, 6, 52, 60, 61, 62)
 """MF-Tyre 5.0, PAC2002, MF 5.2, 6.0, 6.1, 6.2."""
