@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tests.unit.brush.test_mf import HEAD, PLAIN
+from tests.unit.physics.brush.test_mf import HEAD, PLAIN
 from tirelib.core.parameters.tir import parse_tir
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.magic.file import magic_tire

@@ -12,7 +12,7 @@ import pytest
 
 from tests.chain.test_command_line import run
 from tests.synthetic import LATERAL, RATE, header
-from tests.unit.compare.compare_synthetic import bump, model_file, plan, points_of
+from tests.unit.inference.compare.compare_synthetic import bump, model_file, plan, points_of
 from tirelib.campaign import Run, RunPlan, write_campaign
 from tirelib.core.parameters import Number, TireFile, write_tire
 from tirelib.inference.identify.brush_model import brush_of

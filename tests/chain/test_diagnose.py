@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from tests.unit.diagnose.planted import EFFECT, STRENGTH, added, model_file, waves
+from tests.unit.inference.diagnose.planted import EFFECT, STRENGTH, added, model_file, waves
 from tirelib.cli import program
 from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import read_tire, write_tire

@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.chain.test_diagnose import Folder
-from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
-from tests.unit.force_campaigns import brush_file, steady_runs, write_forces
+from tests.unit.inference.diagnose.planted import EFFECT, STRENGTH, model_file, waves
+from tests.unit.inference.force_campaigns import brush_file, steady_runs, write_forces
 from tirelib.cli import program
 from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import read_tire, write_tire

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
-from tests.unit.force_campaigns import brush_file, steady_runs, write_forces, write_sweep
+from tests.unit.inference.force_campaigns import brush_file, steady_runs, write_forces, write_sweep
 from tirelib.campaign import read_campaign
 from tirelib.cli import program
 from tirelib.core.errors import TirelibError

@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 import tirelib
-from tests.unit.force_campaigns import steady_runs, write_forces
+from tests.unit.inference.force_campaigns import steady_runs, write_forces
 from tirelib.cli import program
 from tirelib.core.errors import ParameterError
 

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.chain.test_diagnose import Folder
-from tests.unit.diagnose.planted import EFFECT, STRENGTH, model_file, waves
+from tests.unit.inference.diagnose.planted import EFFECT, STRENGTH, model_file, waves
 from tirelib.cli import program
 from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import write_tire

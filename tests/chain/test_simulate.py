@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 from tests.chain.test_command_line import run
-from tests.unit.diagnose.planted import model_file, waves
+from tests.unit.inference.diagnose.planted import model_file, waves
 from tirelib.cli import main, program
 from tirelib.core.parameters import read_tire, write_tire
 from tirelib.inference.compare.model import model_of, predict_runs

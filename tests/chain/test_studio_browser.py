@@ -16,7 +16,7 @@ import pytest
 from tests.bench.browser import chromium
 from tests.bench.programs import PATIENCE
 from tests.chain.studio_pages import HELD, page_at, saved, serve, wait_for
-from tests.unit.force_campaigns import steady_runs, write_forces
+from tests.unit.inference.force_campaigns import steady_runs, write_forces
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 
 from tests.chain.test_compare import strain_runs
 from tests.synthetic import header
-from tests.unit.compare.compare_synthetic import model_file
+from tests.unit.inference.compare.compare_synthetic import model_file
 from tirelib.campaign import read_campaign, write_campaign
 from tirelib.inference.compare import Comparison, compare
 from tirelib.report.comparison import write_comparison

@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tests.unit.diagnose.planted import runs
-from tests.unit.identify.model_waves import TIRE
+from tests.unit.inference.diagnose.planted import runs
+from tests.unit.inference.identify.model_waves import TIRE
 from tirelib.effects import CATALOGUE
 from tirelib.inference.diagnose.diagnose import diagnose
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs

@@ -10,7 +10,7 @@ from time import process_time
 import numpy as np
 import pytest
 
-from tests.unit.identify.model_waves import TIRE, made_waves
+from tests.unit.inference.identify.model_waves import TIRE, made_waves
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.inference.identify.discrepancy import Discrepancy
 from tirelib.inference.identify.identify import estimated

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.unit.identify.model_waves import TIRE, operating
+from tests.unit.inference.identify.model_waves import TIRE, operating
 from tirelib.core.errors import ConvergenceError
 from tirelib.core.parameters import FIELDS
 from tirelib.effects import CATALOGUE

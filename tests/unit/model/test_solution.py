@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from routes.correction import large_displacements, predict_with
 
-from tests.unit.identify.model_waves import TIRE, operating
+from tests.unit.inference.identify.model_waves import TIRE, operating
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE

@@ -1,0 +1,84 @@
+"""A fit finds strengths, and what a tire shows of other effects within their ranges."""
+
+import numpy as np
+import pytest
+from scipy import optimize
+
+from tests.unit.inference.statistics.linear_problem import EFFECTS, Louder, N, Toy, drawn, family
+from tirelib.inference.statistics.bounded import bounded_step
+from tirelib.inference.statistics.posterior import posterior
+
+FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
+SPREAD = FAMILIES[0].shown()
+
+
+def test_a_strength_and_what_else_the_tire_shows_are_found() -> None:
+    toy = Toy(np.zeros(N))
+    measured = 0.7 * toy.by["bend"][0] + 0.2 * toy.by["swell"][0]
+    wide = {**SPREAD, "swell": 0.3**2}
+    fit = posterior(Toy(measured), [EFFECTS["bend"]], wide, Louder(0.001))
+    assert fit.names == ("bend",)
+    assert fit.strengths[0] / 2.0 == pytest.approx([0.7], abs=0.02)
+    swell = fit.strength("swell")
+    assert swell is not None
+    assert swell / 2.0 == pytest.approx([0.2], abs=0.02)
+
+
+def test_what_a_tire_shows_stays_within_its_range() -> None:
+    toy = Toy(np.zeros(N))
+    wide = {**SPREAD, "twist": 0.3**2}
+    fit = posterior(Toy(-0.4 * toy.by["twist"][0]), [], wide, Louder(0.001))
+    assert fit.strength("twist") == pytest.approx([0.0], abs=1e-9)
+    fit = posterior(Toy(0.4 * toy.by["twist"][0]), [], wide, Louder(0.001))
+    assert fit.strength("twist") == pytest.approx([0.8], abs=0.05)
+
+
+def test_a_step_between_ends_is_the_bottom_there() -> None:
+    random = np.random.default_rng(0)
+    half = random.standard_normal((6, 9))
+    gram, gradient = half @ half.T, random.standard_normal(6)
+    low, high = np.full(6, -0.1), np.array([0.05, 0.1, 0.2, np.inf, np.inf, 0.0])
+    found = bounded_step(gram, gradient, low, high)
+    assert ((found >= low - 1e-9) & (found <= high + 1e-9)).all()
+
+    def cost(dz: np.ndarray) -> float:
+        return float(0.5 * dz @ gram @ dz - gradient @ dz)
+
+    wanted = optimize.minimize(
+        cost, np.zeros(6), method="L-BFGS-B", bounds=list(zip(low, high, strict=True))
+    )
+    assert cost(found) == pytest.approx(wanted.fun, abs=1e-6)
+
+
+def test_the_rest_is_counted_from_where_the_base_starts() -> None:
+    measured = drawn(np.random.default_rng(1), bend=0.5)
+    toy = Toy(measured)
+    fit = posterior(toy, [EFFECTS["bend"]], SPREAD, toy.whitener(0.001))
+    # the toy is linear: nothing but the measured numbers is left without base and effects
+    assert fit.rest == pytest.approx(measured, abs=1e-9)
+
+
+def test_a_fit_from_one_nearby_ends_where_one_from_the_start_does() -> None:
+    random = np.random.default_rng(3)
+    toy = Toy(drawn(random, bend=0.5))
+    base = posterior(toy, [], SPREAD, toy.whitener(0.001))
+    far, near = (
+        posterior(toy, [EFFECTS["bend"]], SPREAD, toy.whitener(0.001), near=start)
+        for start in (None, base)
+    )
+    assert near.strengths[0] == pytest.approx(far.strengths[0], abs=0.1 * far.std(0)[0])
+    assert near.cost == pytest.approx(far.cost, abs=0.1)
+    point = near.point
+    np.testing.assert_allclose(base.slopes_at(point), toy.slopes(point, near.solved))
+
+
+def test_what_a_tire_shows_at_least_is_the_same_beside_every_hypothesis() -> None:
+    """The average over all blocks is, with an effect in the model, that without it."""
+    toy = Toy(0.7 * Toy(np.zeros(N)).by["swell"][0])
+    alone = posterior(toy, [], SPREAD, toy.whitener(0.001)).sizes
+    inside = posterior(toy, [EFFECTS["swell"]], SPREAD, toy.whitener(0.001)).sizes
+    assert inside == pytest.approx(alone)
+    shown = FAMILIES[0].spread(inside)
+    assert shown["bend"] == pytest.approx(FAMILIES[0].spread(alone)["bend"])
+    del inside["swell"]
+    assert FAMILIES[0].spread(inside)["bend"] < 0.9 * shown["bend"]
