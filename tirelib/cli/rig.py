@@ -141,13 +141,15 @@ def _hidden(given: str) -> tuple[str, float]:
     from tirelib.rig.hidden import hidden
 
     name, _, number = given.partition("=")
+    effect = hidden(name)
     try:
-        return hidden(name).name, float(number)
+        strength = float(number)
     except ValueError:
         raise ParameterError(
             f"--hide {given}: EFFECT=STRENGTH is needed, for instance {name}="
-            f"{hidden(name).visible:g}; correct the strength"
+            f"{effect.as_stated(effect.visible):g}; correct the strength"
         ) from None
+    return name, effect.from_stated(strength)
 
 
 def _list(json_file: Path | None) -> None:
@@ -165,12 +167,22 @@ def _list(json_file: Path | None) -> None:
     console = output()
     console.print(table)
     console.print(f"tires: {', '.join(TIRES)}")
+    laws: list[dict[str, Any]] = []
     effects = Table("effect to hide", "visible at", "unit", "law", box=SIMPLE_HEAD)
     for one in HIDDEN.values():
-        effects.add_row(one.name, f"{one.visible:g}", one.unit, one.law)
+        visible = one.as_stated(one.visible)
+        effects.add_row(one.name, f"{visible:g}", one.stated_unit, one.law)
+        laws.append(
+            {"effect": one.name, "visible": visible, "unit": one.stated_unit, "law": one.law}
+        )
     console.print(effects)
+    console.print(
+        "--hide takes strengths in these units, those of `tirelib effects`; the laws are others "
+        "than\nthe catalogue's, so that a strength found is not the one hidden"
+    )
     if json_file is not None:
-        write_json(json_file, {"format": RIG_FORMAT, "plans": rows, "tires": list(TIRES)})
+        document = {"format": RIG_FORMAT, "plans": rows, "tires": list(TIRES), "effects": laws}
+        write_json(json_file, document)
 
 
 def _document(

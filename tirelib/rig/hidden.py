@@ -31,6 +31,22 @@ TireLaw = Callable[[RigTire, Condition, float, float], RigTire]
 
 
 @dataclass(frozen=True)
+class Stated:
+    """The unit in which the library's catalogue has an effect: factor x strength^power.
+
+    The mean over a length and the spread of a height come into the catalogue as squares.
+    """
+
+    unit: str
+    factor: float
+    power: int = 1
+
+
+MICROSTRAIN = Stated("ustrain", 1e6)
+SQUARE_MM = Stated("mm^2", 1e6, 2)
+
+
+@dataclass(frozen=True)
 class Hidden:
     """An effect that the rig can hide.
 
@@ -43,12 +59,15 @@ class Hidden:
     visible, largest : float
         A strength that shows clearly, and the largest that makes sense; in the law's unit.
     unit : str
+        Unit of the law, SI.
     known : bool
         Whether the library's catalogue has an effect of this name.
     signed : bool
         Whether either sign makes sense.
     on_tire, on_trace
         What it changes: the tire of a run, or what the gages show of the solved state.
+    stated : Stated or None
+        How a user states a strength, where that is not the law's unit.
     """
 
     name: str
@@ -60,6 +79,37 @@ class Hidden:
     signed: bool = False
     on_tire: TireLaw | None = None
     on_trace: ShownLaw | None = None
+    stated: Stated | None = None
+
+    @property
+    def stated_unit(self) -> str:
+        """Return the unit in which a user states a strength."""
+        return self.unit if self.stated is None else self.stated.unit
+
+    def as_stated(self, strength: float) -> float:
+        """Return a strength of the law as a user states it."""
+        if self.stated is None:
+            return strength
+        return float(f"{self.stated.factor * strength**self.stated.power:.12g}")
+
+    def from_stated(self, number: float) -> float:
+        """Return the law's strength for what a user states.
+
+        Raises
+        ------
+        ParameterError
+            If it is another sign or size than makes sense; zero is allowed.
+        """
+        low, high = (self.as_stated(s) for s in (0.01 * self.visible, self.largest))
+        if number != 0.0 and not (low <= (abs(number) if self.signed else number) <= high):
+            sides = ", of either sign" if self.signed else ""
+            raise ParameterError(
+                f"{self.name}={number:g}: strengths from {low:g} to {high:g} {self.stated_unit}"
+                f"{sides} are allowed; {self.as_stated(self.visible):g} shows clearly"
+            )
+        if self.stated is None:
+            return number
+        return float((number / self.stated.factor) ** (1.0 / self.stated.power))
 
     def tire(self, tire: RigTire, cond: Condition, place: float, strength: float) -> RigTire:
         """Return the tire as it is in a run."""
@@ -210,7 +260,13 @@ _EFFECTS = (
         on_tire=_turned,
     ),
     Hidden(
-        "belt_shear", "sections of the exact beam, 1 / GA + s", 2e-5, 2e-4, "1/N", on_tire=_shear
+        "belt_shear",
+        "sections of the exact beam, 1 / GA + s",
+        2e-5,
+        2e-4,
+        "1/N",
+        on_tire=_shear,
+        stated=Stated("1/kN", 1e3),
     ),
     Hidden(
         "dynamic_stiffening",
@@ -263,6 +319,7 @@ _EFFECTS = (
         4e-3,
         "m",
         on_tire=_rough,
+        stated=SQUARE_MM,
     ),
     Hidden(
         "nonuniformity",
@@ -272,6 +329,7 @@ _EFFECTS = (
         "1",
         signed=True,
         on_trace=shown.stiff_sector,
+        stated=MICROSTRAIN,
     ),
     Hidden(
         "gage_length",
@@ -280,9 +338,16 @@ _EFFECTS = (
         0.06,
         "m",
         on_trace=shown.bonded_window,
+        stated=SQUARE_MM,
     ),
     Hidden(
-        "low_pass", "amplifier of third order", 2.5e-4, 2e-3, "s", on_trace=shown.third_order_filter
+        "low_pass",
+        "amplifier of third order",
+        2.5e-4,
+        2e-3,
+        "s",
+        on_trace=shown.third_order_filter,
+        stated=Stated("ms", 1e3),
     ),
     Hidden(
         "gage_saturation",
@@ -320,6 +385,7 @@ _EFFECTS = (
         False,
         True,
         on_trace=shown.twice_per_turn,
+        stated=MICROSTRAIN,
     ),
     Hidden(
         "debonding",
@@ -358,6 +424,7 @@ _EFFECTS = (
         "1",
         False,
         on_trace=shown.standing_wave,
+        stated=MICROSTRAIN,
     ),
     Hidden(
         "flat_spot",
@@ -378,6 +445,7 @@ _EFFECTS = (
         False,
         True,
         on_trace=shown.edge_bump,
+        stated=MICROSTRAIN,
     ),
     Hidden(
         "cubic_tread",

@@ -11,7 +11,9 @@ from click.testing import CliRunner
 from tirelib.campaign import read_campaign
 from tirelib.cli.rig import rig
 from tirelib.core.errors import ParameterError
+from tirelib.effects import CATALOGUE
 from tirelib.rig.campaign import run_plan
+from tirelib.rig.hidden import HIDDEN
 from tirelib.rig.plans import Plan, on_one_road
 from tirelib.rig.tire import Condition, RigTire
 
@@ -106,3 +108,29 @@ def test_command_lists_plans_and_asks_for_what_it_needs(tmp_path: Path) -> None:
     assert "reference" in document["tires"]
     assert CliRunner().invoke(rig, []).exit_code == 2
     assert "Example" in CliRunner().invoke(rig, ["--help"]).output
+
+
+def test_strengths_to_hide_are_stated_in_the_units_of_the_catalogue(tmp_path: Path) -> None:
+    file = tmp_path / "list.json"
+    assert CliRunner().invoke(rig, ["--list", "--json", str(file)]).exit_code == 0
+    listed = json.loads(file.read_text(encoding="utf-8"))["effects"]
+    assert [each["effect"] for each in listed] == list(HIDDEN)
+    for each in listed:
+        one = HIDDEN[each["effect"]]
+        if one.known:
+            assert each["unit"] == CATALOGUE[one.name].unit
+        for strength in (0.0, one.visible, one.largest, -one.visible * one.signed):
+            assert one.from_stated(one.as_stated(strength)) == pytest.approx(strength, rel=1e-9)
+    assert HIDDEN["gage_length"].as_stated(0.02) == 400.0  # mm^2
+    assert HIDDEN["low_pass"].as_stated(2.5e-4) == 0.25  # ms
+
+
+@pytest.mark.parametrize("given", ["belt_shear=2e-5", "gage_length=-400", "tread_load=-2"])
+def test_a_strength_in_another_unit_is_refused_before_the_rig_starts(
+    given: str, tmp_path: Path
+) -> None:
+    call = ["--plan", "short", "--hide", given, "--out", str(tmp_path / "out")]
+    refused = CliRunner().invoke(rig, call).exception
+    assert isinstance(refused, ParameterError)
+    assert "shows clearly" in str(refused)
+    assert not (tmp_path / "out").exists()

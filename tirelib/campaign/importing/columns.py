@@ -1,7 +1,7 @@
 """A file as named columns of numbers, whatever its format, and the message about a wrong name."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
 import numpy as np
@@ -10,7 +10,11 @@ import numpy.typing as npt
 from tirelib.core.errors import FormatError
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.intp]
 
+TEXT_TABLE = "text table"
+"""Format of a file whose rows are lines."""
 _SHOWN_ROWS = 5
 _SHOWN_NAMES = 12
 
@@ -59,6 +63,9 @@ class Table:
         Columns that are no numbers, and why.
     notes : tuple of str
         What was found out about the file and should be said.
+    numbers : array of int, shape (n_rows,), or None
+        What a reader counts for each row, from 1: the line of a text table, else the row. None
+        where the rows are the file's own.
     """
 
     file: str
@@ -66,6 +73,18 @@ class Table:
     columns: Mapping[str, Column]
     left_out: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    numbers: IntArray | None = None
+
+    def kept(self, rows: BoolArray, columns: Mapping[str, Column]) -> "Table":
+        """Return the table with other columns, from which all but `rows` were left out."""
+        numbers = np.arange(1, rows.size + 1) if self.numbers is None else self.numbers
+        one = numbers.size == rows.size and _on_one_clock(self.columns)
+        return replace(self, columns=columns, numbers=numbers[rows] if one else self.numbers)
+
+    def places(self, rows: npt.NDArray[np.intp]) -> str:
+        """Return where rows, from 0, stand in the file: the first few, and how many more."""
+        numbers = rows + 1 if self.numbers is None else self.numbers[rows]
+        return number_list("line" if self.form == TEXT_TABLE else "row", numbers)
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
@@ -92,17 +111,21 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"there are {', '.join(names[:_SHOWN_NAMES])}{more}"
 
 
-def row_list(rows: npt.NDArray[np.intp], first: int = 1) -> str:
-    """Return row indices, from 0, as the numbers a reader counts, from `first`.
+def number_list(word: str, numbers: IntArray) -> str:
+    """Return the first of some numbers behind a word, and how many more there are.
 
     Examples
     --------
-    >>> row_list(np.array([0])), row_list(np.arange(10, 17))
-    ('row 1', 'rows 11, 12, 13, 14, 15 and 2 more')
+    >>> number_list("row", np.array([1])), number_list("line", np.arange(11, 18))
+    ('row 1', 'lines 11, 12, 13, 14, 15 and 2 more')
     """
-    shown = ", ".join(str(int(row) + first) for row in rows[:_SHOWN_ROWS])
-    more = f" and {rows.size - _SHOWN_ROWS} more" if rows.size > _SHOWN_ROWS else ""
-    return f"row{'s' if rows.size > 1 else ''} {shown}{more}"
+    shown = ", ".join(str(int(number)) for number in numbers[:_SHOWN_ROWS])
+    more = f" and {numbers.size - _SHOWN_ROWS} more" if numbers.size > _SHOWN_ROWS else ""
+    return f"{word}{'s' if numbers.size > 1 else ''} {shown}{more}"
+
+
+def _on_one_clock(columns: Mapping[str, Column]) -> bool:
+    return len({(c.clock, c.values.size) for c in columns.values() if not c.constant}) == 1
 
 
 def refusal(file: str, given: str, allowed: str, remedy: str) -> FormatError:

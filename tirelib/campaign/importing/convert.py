@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tirelib.campaign.finding import RunFinding
-from tirelib.campaign.importing.columns import Column, Table, did_you_mean, row_list
+from tirelib.campaign.importing.columns import Column, Table, did_you_mean
 from tirelib.campaign.importing.defects import Clock
 from tirelib.campaign.importing.mapfile import ChannelRule, ImportMap
 from tirelib.campaign.importing.mapheader import GAGE_TIME, is_gage, strain_number
@@ -278,7 +278,7 @@ class _Conversion:
             self.fault(
                 "run",
                 where,
-                f"{runs[wrong[0]]:g} in {row_list(wrong)}",
+                f"{runs[wrong[0]]:g} in {self.table.places(wrong)}",
                 "a whole number, 0 or more, is needed",
                 "correct the column",
             )
@@ -294,7 +294,7 @@ class _Conversion:
                 self.fault(
                     "run",
                     where,
-                    f"run {run} comes again in row {span.start + 1}",
+                    f"run {run} comes again in {self.table.places(np.array([span.start]))}",
                     "the rows of a run must be consecutive",
                     "sort the rows, or renumber the runs",
                 )
@@ -317,7 +317,7 @@ class _Conversion:
                 self.fault(
                     "finite",
                     f"column {columns[quantity].name!r} ({quantity})",
-                    f"{rows.size} value(s) are NaN or infinite, in {row_list(rows)}",
+                    f"{rows.size} value(s) are NaN or infinite, in {self.table.places(rows)}",
                     "finite numbers are needed",
                     'drop these rows or fill them with missing = "drop" or '
                     '"interpolate" in the map, or map another column',
@@ -407,7 +407,7 @@ class _Conversion:
                 first = int(np.flatnonzero(wrong)[0])
                 problem = Problem(
                     f"{source}, time",
-                    f"{given} in {row_list(rows[wrong])} (t = {inside[first]:.6g} s"
+                    f"{given} in {self.table.places(rows[wrong])} (t = {inside[first]:.6g} s"
                     + (f", {count} in all)" if count > 1 else ")"),
                     "time must increase from row to row",
                     f"sort out the clock at its source, or say {choice} in the map",

@@ -8,11 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from tirelib.campaign.importing.columns import Column, FloatArray, Table, row_list
-
-BoolArray = npt.NDArray[np.bool_]
+from tirelib.campaign.importing.columns import BoolArray, Column, FloatArray, IntArray, Table
 
 CHOICES = {
     "repeated_time": ("drop",),
@@ -55,6 +52,16 @@ class Clock:
     mapped: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class _Change:
+    """What a choice of the map did to some rows, and to which."""
+
+    key: str
+    choice: str
+    rows: IntArray
+    what: str
+
+
 def mended(
     table: Table, defects: Defects, clocks: Sequence[Clock], run_column: str
 ) -> tuple[Table, list[str]]:
@@ -90,27 +97,24 @@ def _on_clock(
         return table, []
     runs = group.get(run_column, np.zeros(size))
     keep = np.ones(size, dtype=np.bool_)
-    notes = [
-        *_missing(
-            group,
-            keep,
-            [n for n in (clock.name, *clock.mapped) if n in group],
-            clock.name,
-            defects.missing,
-        ),
+    mapped = [n for n in (clock.name, *clock.mapped) if n in group]
+    changes = [
+        *_missing(group, keep, mapped, clock.name, defects.missing),
         *_backward(group[clock.name], keep, runs, defects.backward_time),
         *_repeated(group[clock.name], keep, runs, defects.repeated_time),
     ]
     changed = {
         name: replace(table.columns[name], values=values[keep]) for name, values in group.items()
     }
-    columns: dict[str, Column] = {**table.columns, **changed}
-    return replace(table, columns=columns), notes
+    return table.kept(keep, {**table.columns, **changed}), [
+        f'{each.key} = "{each.choice}": {each.rows.size} {each.what} ({table.places(each.rows)})'
+        for each in changes
+    ]
 
 
 def _missing(
     group: dict[str, FloatArray], keep: BoolArray, names: Sequence[str], clock: str, choice: str
-) -> list[str]:
+) -> list[_Change]:
     """Drop or fill the rows without numbers; a row without a time can only be dropped."""
     lost = {name: ~np.isfinite(group[name]) for name in names}
     rows = np.any(list(lost.values()), axis=0)
@@ -118,7 +122,7 @@ def _missing(
         return []
     if choice == "drop":
         keep &= ~rows
-        return [_note("missing", choice, rows, "rows without a number were left out")]
+        return [_change("missing", choice, rows, "rows without a number were left out")]
     timed = ~lost[clock]
     keep &= timed
     notes = []
@@ -130,7 +134,7 @@ def _missing(
         group[name][holes] = np.interp(group[clock][holes], group[clock][sound], group[name][sound])
         longest = int(np.diff(np.flatnonzero(np.diff(np.r_[0, holes, 0]))).max(initial=0))
         notes.append(
-            _note(
+            _change(
                 "missing",
                 choice,
                 holes,
@@ -138,11 +142,11 @@ def _missing(
             )
         )
     if lost[clock].any():
-        notes.append(_note("missing", choice, lost[clock], "rows without a time were left out"))
+        notes.append(_change("missing", choice, lost[clock], "rows without a time were left out"))
     return notes
 
 
-def _backward(times: FloatArray, keep: BoolArray, runs: FloatArray, choice: str) -> list[str]:
+def _backward(times: FloatArray, keep: BoolArray, runs: FloatArray, choice: str) -> list[_Change]:
     """Leave out rows whose time falls back, or shift what follows; changes times in place."""
     if not choice:
         return []
@@ -163,7 +167,7 @@ def _backward(times: FloatArray, keep: BoolArray, runs: FloatArray, choice: str)
         at = np.zeros(times.size, dtype=np.bool_)
         at[rows[falls]] = True
         return [
-            _note(
+            _change(
                 "backward_time",
                 choice,
                 at,
@@ -177,10 +181,10 @@ def _backward(times: FloatArray, keep: BoolArray, runs: FloatArray, choice: str)
         reached = np.maximum.accumulate(before)
         wrong[inside[1:]] = (now < reached) | ((now == reached) & (before < reached))
     keep &= ~wrong
-    return [_note("backward_time", choice, wrong, "rows whose time fell back were left out")]
+    return [_change("backward_time", choice, wrong, "rows whose time fell back were left out")]
 
 
-def _repeated(times: FloatArray, keep: BoolArray, runs: FloatArray, choice: str) -> list[str]:
+def _repeated(times: FloatArray, keep: BoolArray, runs: FloatArray, choice: str) -> list[_Change]:
     """Leave out all but the first row of a time."""
     rows = np.flatnonzero(keep & np.isfinite(times))
     again = np.zeros(times.size, dtype=np.bool_)
@@ -189,10 +193,11 @@ def _repeated(times: FloatArray, keep: BoolArray, runs: FloatArray, choice: str)
         return []
     keep &= ~again
     return [
-        _note("repeated_time", choice, again, "rows with the time of the row before were left out")
+        _change(
+            "repeated_time", choice, again, "rows with the time of the row before were left out"
+        )
     ]
 
 
-def _note(key: str, choice: str, rows: BoolArray, what: str) -> str:
-    at = np.flatnonzero(rows)
-    return f'{key} = "{choice}": {at.size} {what} ({row_list(at)})'
+def _change(key: str, choice: str, rows: BoolArray, what: str) -> _Change:
+    return _Change(key, choice, np.flatnonzero(rows), what)

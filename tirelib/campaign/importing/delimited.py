@@ -13,7 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from tirelib.campaign.importing.columns import Column, FloatArray, Table, refusal
+from tirelib.campaign.importing.columns import (
+    TEXT_TABLE,
+    Column,
+    FloatArray,
+    Table,
+    refusal,
+)
 from tirelib.core.units import dimensions_of_unit
 
 SEPARATORS = {";": "';'", "\t": "tab", ",": "','", "|": "'|'", " ": "blanks"}
@@ -84,14 +90,13 @@ def read_delimited(path: Path, options: CsvOptions) -> Table:
     units = _split(lines[units_at], layout.separator) if units_at is not None else []
     body = [(number, line) for number, line in enumerate(lines[first:], first + 1) if line.strip()]
     _check_counts(str(path), body, layout)
-    columns, left_out, found = _columns(
-        names, units, [line for _, line in body], layout, options.text_is_missing
-    )
+    columns, left_out, found = _columns(names, units, body, layout, options.text_is_missing)
     note = f"read as text table: {layout}, names in line {names_at + 1}"
     note += f", units in line {units_at + 1}" if units_at is not None else ""
     note += f", {len(body)} rows from line {first + 1}"
     note += f", encoding {encoding}" if encoding != "utf-8" else ""
-    return Table(str(path), "text table", columns, left_out, (note, *found))
+    numbers = np.array([number for number, _ in body])
+    return Table(str(path), TEXT_TABLE, columns, left_out, (note, *found), numbers)
 
 
 def _decoded(path: Path) -> tuple[str, str]:
@@ -276,7 +281,7 @@ def _check_counts(file: str, body: Sequence[tuple[int, str]], layout: _Layout) -
 def _columns(
     names: Sequence[str],
     units: Sequence[str],
-    body: Sequence[str],
+    body: Sequence[tuple[int, str]],
     layout: _Layout,
     text_is_missing: bool,
 ) -> tuple[dict[str, Column], dict[str, str], list[str]]:
@@ -284,7 +289,7 @@ def _columns(
     import pandas as pd
 
     frame = pd.read_csv(
-        StringIO("\n".join(body)),
+        StringIO("\n".join(line for _, line in body)),
         sep=r"\s+" if layout.separator == " " else layout.separator,
         decimal=layout.decimal,
         header=None,
@@ -310,7 +315,7 @@ def _columns(
         else:
             cells = [str(cell).strip() for cell in series]
             values = _numbers(cells, layout.decimal)
-            said = _first_text(cells, layout.decimal)
+            said = _text_at([number for number, _ in body], cells, layout.decimal)
             if text_is_missing and np.isfinite(values).any():
                 stated = _bare(units[place]) if units else _unit_in(name)
                 columns[name] = Column(name, values, stated)
@@ -337,8 +342,15 @@ def _unit_in(name: str) -> str:
     return match["unit"].strip() if match and dimensions_of_unit(match["unit"]) else ""
 
 
-def _first_text(cells: Sequence[str], decimal: str) -> str:
-    for row, cell in enumerate(cells, start=1):
-        if cell.strip() not in _MISSING and not _is_number(cell.strip(), decimal):
-            return f"row {row} holds {cell!r}, which is no number with decimal {decimal!r}"
-    return "its cells are no numbers"
+def _text_at(lines: Sequence[int], cells: Sequence[str], decimal: str) -> str:
+    """Return which line holds the first text, and how many do."""
+    texts = [
+        (line, cell)
+        for line, cell in zip(lines, cells, strict=True)
+        if cell not in _MISSING and not _is_number(cell, decimal)
+    ]
+    if not texts:
+        return "its cells are no numbers"
+    line, cell = texts[0]
+    count = f" ({len(texts)} such lines in all)" if len(texts) > 1 else ""
+    return f"line {line} holds {cell!r}, which is no number with decimal {decimal!r}{count}"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tirelib.campaign.importing.columns import Column, Table, refusal
+from tirelib.campaign.importing.columns import TEXT_TABLE, Column, Table, refusal
 from tirelib.campaign.importing.delimited import CsvOptions, read_delimited
 from tirelib.campaign.importing.matlab import (
     HDF5_MAGIC,
@@ -20,10 +20,10 @@ from tirelib.core.errors import FormatError
 
 SUFFIXES = {
     ".mat": "MATLAB",
-    ".csv": "text table",
-    ".tsv": "text table",
-    ".txt": "text table",
-    ".dat": "text table",
+    ".csv": TEXT_TABLE,
+    ".tsv": TEXT_TABLE,
+    ".txt": TEXT_TABLE,
+    ".dat": TEXT_TABLE,
     ".parquet": "Parquet",
     ".tdx": "TYDEX",
     ".tyd": "TYDEX",
@@ -61,7 +61,7 @@ def read_table(path: Path, options: CsvOptions | None = None) -> Table:
             "rename the file by its format, or convert it",
         )
     found = _content(path)
-    if stated != found and not (stated == "text table" and found == "TYDEX"):
+    if stated != found and not (stated == TEXT_TABLE and found == "TYDEX"):
         raise refusal(
             file,
             f"its content is {found}, its suffix {path.suffix!r} states {stated}",
@@ -111,7 +111,7 @@ def _content(path: Path) -> str:
     return (
         "no known binary format"
         if b"\0" in head and head[:2] not in (b"\xff\xfe", b"\xfe\xff")
-        else "text table"
+        else TEXT_TABLE
     )
 
 

@@ -64,6 +64,10 @@ class ForceCell:
     excess, excess_std : float
         Mean of how much the model's size exceeds the measured, and its standard deviation from
         repeats (NaN without).
+    shift : float
+        In a cell of camber: mean of model less measured, turned with the sign of camber. A camber
+        thrust that the model lacks shifts the force on both sides alike, which no size shows.
+        NaN elsewhere.
     member : shape (n,)
     """
 
@@ -75,7 +79,18 @@ class ForceCell:
     mean: float
     excess: float
     excess_std: float
+    shift: float
     member: BoolArray
+
+    @property
+    def is_shifted(self) -> bool:
+        """Whether a shift says more than a difference in size."""
+        return abs(self.shift) > abs(self.excess)
+
+    @property
+    def largest(self) -> float:
+        """Return the larger of the two."""
+        return self.shift if self.is_shifted else self.excess
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,6 +300,9 @@ def _table(
                     float(d.mean()),
                     float(excess[member].mean()),
                     noise / np.sqrt(n),
+                    float(np.mean(d * np.sign(data.camber[member])))
+                    if by == "camber" and low > 0.0
+                    else float("nan"),
                     member,
                 )
             )
@@ -294,19 +312,26 @@ def _table(
 def _sentences(name: str, table: Sequence[ForceCell], freedom: int) -> tuple[str, ...]:
     """Say the cells, and pairs of a slip cell with a load or pressure cell, that stand out."""
     parts = [cell for cell in table if cell.by != "all"]
-    ranked = sorted(parts, key=lambda cell: -cell.points * cell.excess**2)
+    ranked = sorted(parts, key=lambda cell: -cell.points * cell.largest**2)
+    looked_at = len(parts) + sum(np.isfinite(cell.shift) for cell in parts)
     total = table[0].points * table[0].rms ** 2
     out: list[str] = []
     for cell in ranked:
-        t = abs(cell.excess) / cell.excess_std if cell.excess_std > 0 else 0.0
-        p = 2.0 * special.stdtr(freedom, -t) * len(parts)
-        large = cell.points * cell.excess**2 > LEAST_SHARE * total
+        t = abs(cell.largest) / cell.excess_std if cell.excess_std > 0 else 0.0
+        p = 2.0 * special.stdtr(freedom, -t) * looked_at
+        large = cell.points * cell.largest**2 > LEAST_SHARE * total
         if p < LEVEL and large and len(out) < MOST_REGIONS:
             out.append(_say(name, cell))
     return tuple(out)
 
 
 def _say(name: str, cell: ForceCell) -> str:
+    if cell.is_shifted:
+        return (
+            f"At camber {range_of(cell)} the model's {name} is shifted by {_signed(cell.shift)} "
+            f"± {_short(1.96 * cell.excess_std)} {UNITS[name]} where camber is "
+            f"positive, and the other way where it is negative (95 %, {cell.points} points)."
+        )
     kind = {"slip_angle": "slip angle", "slip_ratio": "slip ratio"}.get(cell.by, cell.by)
     size = "large" if cell.excess > 0.0 else "small"
     sign = ", either sign, " if cell.by in SLIP_LIMITS else ", "
@@ -329,6 +354,10 @@ def range_of(cell: ForceCell) -> str:
         grain = 1.0
     low, high = (told(cell.by, grain * round(value / grain)) for value in (cell.low, cell.high))
     return low if low == high else f"{low} to {high}"
+
+
+def _signed(value: float) -> str:
+    return f"{'-' if value < 0.0 else '+'}{_short(abs(value))}"
 
 
 def _short(value: float) -> str:

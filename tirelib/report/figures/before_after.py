@@ -79,7 +79,7 @@ def run_errors(steps: Sequence[Mapping[str, Any]], unit: str) -> list[Plot]:
     ):
         name = f"{when}, held out of the fit"
         figure.add_scatter(**dots(names, values, name, colour, 8, symbol=symbol, line={"width": 2}))
-    figure.update_xaxes(title="runs, by load", tickangle=-60, tickfont={"size": 10})
+    figure.update_xaxes(title="runs, by load [N]", tickangle=-60, tickfont={"size": 10})
     return [
         Plot.of(
             "run-errors",

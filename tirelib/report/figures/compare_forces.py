@@ -80,7 +80,7 @@ def _map(found: ForceComparison) -> Plot:
             z[i, j] = factor * float(found.difference[inside].mean())
     labels = [told("load", 50.0 * round(float(v) / 50.0)) for v in y]
     figure = heat(z, x, slip.label, unit, 220 + 34 * y.size, hoverongaps=False)
-    ticks(figure, range(y.size), labels, "load")
+    ticks(figure, range(y.size), labels, "load [N]")
     names = [f"load {text}: [{unit}]" for text in labels]
     return Plot.of(
         "force-map",
@@ -175,7 +175,7 @@ def _varied(found: ForceComparison) -> Iterator[str]:
 def _trend(found: ForceComparison, name: str) -> Plot:
     unit, label = UNITS[found.quantity], QUANTITIES[name].label
     x, column = _binned(found, name)
-    if name == slip_of(found.quantity):
+    if name in (slip_of(found.quantity), "camber"):  # which shifts both signs of a force alike
         what, text, values = f"{LESS} {found.quantity}", "", found.difference
     else:
         what, text = (

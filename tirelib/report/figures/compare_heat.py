@@ -72,7 +72,7 @@ def _runs(found: Comparison) -> Plot:
         for i in order
     ]
     figure = _turns(data, labels, unit, 620)
-    ticks(figure, *_load_ticks(found, order), "runs by load, pressure and speed")
+    ticks(figure, *_load_ticks(found, order), "runs by load [N], then pressure and speed")
     figure.update_yaxes(range=[-0.5, len(order) - 0.5])
     edges = np.rad2deg(found.prediction.edges[order])
     first = int(straight.sum())  # between the counted runs and the others the lines are open
@@ -128,14 +128,15 @@ def _map(
     factor, noise = unit_of(found)
     said = [f"{text} ({n} runs)" for text, n in zip(labels, count, strict=True)]
     figure = _turns(factor * data, said, noise, 200 + 34 * len(labels))
-    ticks(figure, range(len(labels)), labels, NAMES[name])
+    title = f"{NAMES[name]}{f' [{unit}]' if unit else ''}"
+    ticks(figure, range(len(labels)), labels, title)
     axes = " (ISO 8855)" if name == "gage" or QUANTITIES[name].signed else ""
     return Plot.of(
         f"heat-{name.replace('_', '-')}",
         f"By {NAMES[name]}{axes}",
         f"Mean over the runs of each level. {SIGN}",
         figure,
-        *_data(labels, f"{NAMES[name]}{f' [{unit}]' if unit else ''}", factor * data, noise),
+        *_data(labels, title, factor * data, noise),
     )
 
 

@@ -24,7 +24,7 @@ def _map(found: Assessment, left: Left, name: str, title: str) -> Plot:
     labels = [f"run {run[k]}: {points.load[k]:.0f} N" for k in order]
     figure = turn_map(data, unit, 480, limit=limit_of(found.refitted.white_of(found.refitted.rest)))
     marks = range(0, len(order), max(1, len(order) // 10))
-    ticks(figure, marks, [labels[k] for k in marks], "runs, by load")
+    ticks(figure, marks, [labels[k] for k in marks], "runs, by load [N]")
     columns = zip((f"{label} [{unit}]" for label in labels), data, strict=True)
     return Plot.of(
         f"residual-{name}",

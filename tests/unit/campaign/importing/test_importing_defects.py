@@ -46,7 +46,7 @@ def test_a_defect_is_refused_with_the_choice_that_the_map_has(
     tmp_path: Path, refused: Refused, defect: str
 ) -> None:
     lines = refused(damaged(tmp_path, defect))
-    assert any(f'{defect} = "drop"' in line and "row" in line for line in lines), lines
+    assert any(f'{defect} = "drop"' in line and "in line" in line for line in lines), lines
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_a_defect_is_refused_with_the_choice_that_the_map_has(
         ("repeated_time", "drop", 397, "3 rows with the time of the row before were left out"),
         ("backward_time", "drop", 250, "150 rows whose time fell back were left out"),
         ("backward_time", "join", 400, "1 segments were joined"),
-        ("missing", "drop", 398, "2 rows without a number were left out (rows 8, 9)"),
+        ("missing", "drop", 398, "2 rows without a number were left out (lines 9, 10)"),
         ("missing", "interpolate", 400, "2 numbers of column 'FZ' were interpolated"),
     ],
 )
@@ -104,6 +104,16 @@ def test_a_heading_in_the_middle_of_a_joined_file_is_text_that_the_map_may_call_
     report = imported(file, by=sae_map(text="missing", missing="drop"))
     assert report.runs[0].rows == 400
     assert "'FZ', which is no number" in read_campaign(report.campaign).header.rig_note
+
+
+def test_lines_are_those_of_the_file_after_others_were_left_out(
+    tmp_path: Path, refused: Refused
+) -> None:
+    columns = sae_columns()
+    columns["FZ"][[2, 3]] = np.nan  # lines 4 and 5, which the map leaves out
+    columns["ET"][99] = columns["ET"][98]  # line 101
+    lines = refused(write_csv(tmp_path / "rig.csv", columns), by=sae_map(missing="drop"))
+    assert any("occurs again in line 101 (t =" in line for line in lines), lines
 
 
 def test_times_that_start_anew_in_each_run_are_no_defect(

@@ -272,7 +272,7 @@ def test_text_where_numbers_should_be_is_named(refused: Refused, tmp_path: Path)
     cells[3] = "fault"
     lines[300] = ",".join(cells)
     file.write_text("\n".join(lines))
-    says(refused(file), "column 'FZ' (Fz)", "row 300 holds 'fault', which is no number")
+    says(refused(file), "column 'FZ' (Fz)", "line 301 holds 'fault', which is no number")
 
 
 def test_no_time_and_no_rate_is_named(refused: Refused, tmp_path: Path) -> None:
