@@ -1,6 +1,7 @@
 """What several verbs share: paths that they read and write, JSON files, tables."""
 
 import os
+from difflib import get_close_matches
 from errno import ENOTDIR
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -14,7 +15,11 @@ from tirelib.core.documents import write_json as write_json
 
 
 class NewPath(click.Path):
-    """A file or folder that a verb writes, refused before any work where it cannot be written."""
+    """A file or folder that a verb writes, refused before any work where it cannot be written.
+
+    Folders on the way to it that do not exist are made, which the verb says at its end: a name
+    that is misspelt is seen.
+    """
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         """Return the path; nothing is left behind by the trial."""
@@ -36,7 +41,20 @@ class NewPath(click.Path):
                 param,
                 ctx,
             )
+        if ctx is not None and place not in (path, path.parent):
+            ctx.call_on_close(lambda: _say_new(path, place))
         return path
+
+
+def _say_new(path: Path, place: Path) -> None:
+    """Name the folder below `place` that was made on the way to `path`, and one named alike."""
+    new = place / path.relative_to(place).parts[0]
+    if not new.is_dir():
+        return
+    others = [each.name for each in place.iterdir() if each.is_dir() and each != new]
+    near = get_close_matches(new.name, others, 1, 0.8)
+    beside = f"; there is {place / near[0]} as well" if near else ""
+    click.echo(f"note: the folder {new} is new{beside}", err=True)
 
 
 class NewPlace(NewPath):

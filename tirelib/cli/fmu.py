@@ -119,7 +119,9 @@ fmu.add_command(measure)
     type=int,
     default=1,
     show_default=True,
-    help="Number of samples of each gage in one communication step.",
+    help="Number of samples of each gage in one communication step: the step is K divided by the "
+    "sample rate. 1 suits a host that steps once a sample; give the number of VirtualTire.fmu or "
+    "of the transmitter's frame where they feed this FMU.",
 )
 @click.option(
     "--sample-rate",
@@ -198,6 +200,11 @@ def build(
         console.print(f"not varied in the calibration: {condition}")
     free = f"of any length, up to {samples_per_step} samples"
     console.print(f"communication step {free if buffered else f'{step:g} ms'}")
+    if samples_per_step == 1:
+        console.print(
+            "one sample a step: behind a VirtualTire.fmu or a transmitter build with its number of "
+            "samples (--samples-per-step; `tirelib fmu virtual` takes 10 unless told otherwise)"
+        )
     console.print(f"written: {path} ({path.stat().st_size / 1e3:.0f} kB)")
     console.print(f"next: {shlex.join(['tirelib', 'fmu', 'check', str(path)])}")
 

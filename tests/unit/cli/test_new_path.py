@@ -58,3 +58,28 @@ def test_nothing_is_left_behind_and_what_stands_there_is_kept(tmp_path: Path) ->
     assert NEW_FILE.convert(str(new), None, None) == new
     assert old.read_text() == "old"
     assert list(tmp_path.iterdir()) == [old]
+
+
+@pytest.mark.parametrize(
+    ("target", "said"),
+    [
+        ("projects/rig.json", ""),
+        ("new.json", ""),
+        ("progects/rig.json", "progects is new; there is {0}/projects as well"),
+        ("results/today/rig.json", "results is new\n"),
+    ],
+)
+def test_folders_that_are_made_on_the_way_are_said(target: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "projects").mkdir()
+    done = CliRunner().invoke(program, ["rig", "--list", "--json", str(tmp_path / target)])
+    assert done.exit_code == 0
+    assert (tmp_path / target).is_file()
+    wanted = f"note: the folder {tmp_path}/{said.format(tmp_path)}" if said else ""
+    assert done.stderr.rstrip() == wanted.rstrip()
+
+
+def test_a_folder_that_was_not_made_is_not_said(tmp_path: Path) -> None:
+    call = ["features", str(tmp_path / "none"), "--out", str(tmp_path / "new" / "F.parquet")]
+    done = CliRunner().invoke(program, call)
+    assert done.exit_code != 0
+    assert "is new" not in done.stderr

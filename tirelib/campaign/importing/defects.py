@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.campaign.importing.columns import BoolArray, Column, FloatArray, IntArray, Table
+from tirelib.campaign.importing.columns import BoolArray, FloatArray, IntArray, Table
 
 CHOICES = {
     "repeated_time": ("drop",),
