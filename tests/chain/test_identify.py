@@ -36,8 +36,9 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def files(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("out")
-    out = {name: folder / name for name in ("model", "json", "first")}
+    out = {name: folder / name for name in ("model", "json", "first", "report")}
     words = ["--out", str(out["model"]), "--json", str(out["json"]), "--first", str(out["first"])]
+    words += ["--report", str(out["report"])]
     found = CliRunner().invoke(program, ["identify", str(campaign), *words])
     assert found.exit_code == 0, found.output
     assert "4 straight runs, 5 of 5 gages averaged" in found.output
@@ -59,6 +60,22 @@ def test_the_ring_before_its_intervals_is_compared_as_the_whole_model(
         name: number.value for name, number in whole.items()
     }
     assert "interval" not in files["first"].read_text()
+
+
+def test_the_page_has_every_number_its_interval_and_the_next_step(
+    campaign: Path, document: dict[str, Any], files: dict[str, Path]
+) -> None:
+    text = (files["report"] / "identification.md").read_text(encoding="utf-8")
+    page = (files["report"] / "identification.html").read_text(encoding="utf-8")
+    for entry in document["parameters"]:
+        row = f"| {entry['name']} | {entry['meaning']} | {entry['unit']} | "
+        assert row in text
+        assert row.split(" | ")[1] in page
+        if entry["flags"]:
+            assert f"| {entry['name']} | {', '.join(entry['flags'])} | " in text
+    assert f"- **Next**: tirelib compare {campaign} --model {files['model']}" in text
+    assert '"ring-intervals"' in page
+    assert '"ring-correlation"' in page
 
 
 def test_a_gage_without_numbers_is_warned_of_before_the_results(

@@ -92,9 +92,21 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def alone(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     out = tmp_path_factory.mktemp("alone")
-    found = call(campaign, out)
+    found = call(campaign, out, "--report", str(out / "report"))
     assert found.exit_code == 0, found.output
     return out, found.output
+
+
+def test_the_page_of_a_brush_has_no_ring(alone: tuple[Path, str]) -> None:
+    out, said = alone
+    text = (out / "report" / "identification.md").read_text(encoding="utf-8")
+    assert "## Brush" in text
+    assert "## Ring" not in text
+    for each in document(out)["brush"]["parameters"]:
+        assert f"| {each['name']} | {each['meaning']} |" in text
+    assert "| Fy | " in text  # what the brush leaves of it
+    assert f"written: {out / 'report' / 'identification.html'}" in said
+    assert "next: tirelib compare" in said
 
 
 def test_the_brush_comes_back_with_units_and_intervals(alone: tuple[Path, str]) -> None:

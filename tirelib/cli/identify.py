@@ -1,6 +1,7 @@
 """``tirelib identify``: the tire's parameters from a campaign, with intervals and flags."""
 
 import os
+import shlex
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from tirelib.campaign import Campaign, read_campaign
-from tirelib.cli.common import CAMPAIGN, NEW_FILE, output, write_json
+from tirelib.cli.common import CAMPAIGN, NEW_FILE, NEW_FOLDER, output, write_json
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import is_verbose, progress_bar, progress_options
 
@@ -28,7 +29,7 @@ both want; with half (5) it gets 75 %, with double (19 at most) 99 %. No number 
 _EXAMPLE = """\b
 Examples:
   tirelib rig --plan short --hide sidewall_damping=0.05 --out straight
-  tirelib identify straight --out M.toml --json identified.json
+  tirelib identify straight --out M.toml --report identified --json identified.json
   tirelib simulate --model M.toml --load 4000 --speed 80 --out simulated
 
 \b
@@ -72,6 +73,13 @@ whose interval is wider than 25 % to either side, with the test that would deter
     help="File for the ring as soon as it is fitted, before intervals, advice and forces. `tirelib "
     "compare` reads it and gives what it gives of M.toml.",
 )
+@click.option(
+    "--report",
+    "report",
+    metavar="DIR",
+    type=NEW_FOLDER,
+    help="Folder for identification.html and identification.md.",
+)
 @json_option()
 @progress_options
 @click.pass_context
@@ -82,6 +90,7 @@ def identify(
     base: str,
     out: Path,
     first: Path | None,
+    report: Path | None,
     json_file: Path | None,
 ) -> None:
     """Fit the base model, ring and brush, to DIR."""
@@ -124,8 +133,17 @@ def identify(
     if json_file is not None:
         write_json(json_file, document)
         console.print(f"written: {json_file}")
-    console.print(f"next: tirelib compare {folder} --model {out} --out compared")
-    console.print(f"      tirelib diagnose {folder} --model {out} --out diagnosed")
+    following = [
+        shlex.join(["tirelib", verb, str(folder), "--model", str(out), "--out", f"{verb}d"])
+        for verb in ("compare", "diagnose")
+    ]
+    if report is not None:
+        from tirelib.report.identification import write_identification
+
+        for path in write_identification(document, report, commands=following):
+            console.print(f"written: {path}")
+    console.print(f"next: {following[0]}")
+    console.print(f"      {following[1]}")
     brush = document["brush"]
     every = [*document["parameters"], *(brush["parameters"] if brush else [])]
     told = any("not_identifiable" not in entry["flags"] for entry in every)
@@ -230,9 +248,10 @@ def _say_parameters(console: Console, parameters: list[dict[str, Any]]) -> None:
     console.print(_table(known if not is_verbose() else parameters))
     unknown = [entry for entry in parameters if entry not in known]
     if unknown:
+        names = ", ".join(entry["name"] for entry in unknown)
         console.print(
-            f"  {len(unknown)} parameters are not determined: the 95 % interval reaches further "
-            f"than 25 % to either side: {', '.join(entry['name'] for entry in unknown)}"
+            f"  {len(unknown)} parameters are not determined (the 95 % interval reaches further "
+            f"than 25 % to either side, or is hardly narrower than the prior): {names}"
         )
     helped = [entry for entry in parameters if entry["helps"]]
     if is_verbose():
