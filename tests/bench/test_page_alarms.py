@@ -3,6 +3,7 @@
 import json
 import math
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 from tests.bench.in_process import FakeSource
 from tests.bench.test_protocols import RAW16, some_raw
+from tests.bench.test_timeline import line_of
 from tirebench.cli.live import counters
 from tirebench.errors import DeviceError
 from tirebench.estimator.estimation import News
@@ -37,6 +39,7 @@ from tirebench.setup.source_plan import SourcePlan, wheels_of
 from tirebench.wire.can_batch import pack, same_kind
 from tirebench.wire.conditions import Conditions, Measured
 from tirebench.wire.device import Device
+from tirebench.wire.frames import FrameFlag
 from tirebench.wire.line_counts import NO_FRAME, NOTHING, LineCounts
 
 LOSS = Rule("samples lost", "%", high=1.0, hysteresis=0.5)
@@ -127,6 +130,26 @@ def test_rate_and_loss_are_those_of_the_last_seconds() -> None:
     assert seen[40]["loss_percent"] == pytest.approx(10.0)
     assert seen[40]["invalid_percent"] == pytest.approx(100.0 / 3.0)
     assert len(recent._seen) == round(WINDOW_SECONDS / 0.25) + 1
+
+
+def test_a_pause_that_the_wheel_declares_is_no_missing_sample() -> None:
+    """Runs of a second with a tenth between them, as an emulator plays a campaign."""
+    wheel, recent = FakeSource(0).wheels.heard[0], Recent()
+    shares = []
+    for run in range(12):
+        for part in range(5):
+            begin = 1.1 * run + 0.2 * part
+            frames = line_of(125, seq=625 * run + 125 * part, t_us=round(1e6 * begin))
+            flags = np.zeros(125, dtype=np.int64)
+            flags[0] = FrameFlag.TIME_RESET if part == 0 else 0
+            wheel.timeline.push(replace(frames, flags=flags))
+            shares.append(recent.look(wheel, 0, 0, begin + 0.2)["rate_percent"])
+    assert wheel.timeline.paused == pytest.approx(1.1, abs=0.01)
+    assert shares[0] is None
+    # an end of the window may cut a pause in two
+    assert shares[10:] == pytest.approx([100.0] * 50, abs=3.0)
+    told = Alarms(RULES)
+    assert not any(told.look({"rate": share}, 0, 0.0) for share in shares)
 
 
 def test_what_a_wheel_says_of_itself_reaches_the_page() -> None:

@@ -1,4 +1,8 @@
-"""The last seconds of a wheel's line: how much came of what was expected, what was lost."""
+"""The last seconds of a wheel's line: how much came of what was expected, what was lost.
+
+A pause that the wheel itself declares, such as that between two runs of an emulator, is no loss:
+nothing is expected in it.
+"""
 
 import time
 from collections import deque
@@ -20,6 +24,7 @@ class _Seen(NamedTuple):
     turns: int
     invalid: int
     low_battery: int
+    paused: float
 
 
 class Recent:
@@ -53,6 +58,7 @@ class Recent:
                 turns,
                 invalid,
                 counts.low_battery,
+                wheel.timeline.paused,
             )
         )
         while len(seen) > 2 and now - seen[1].moment >= WINDOW_SECONDS:
@@ -65,10 +71,13 @@ class Recent:
             last.turns - first.turns,
         )
         known = elapsed >= SHORTEST_WINDOW
+        sending = elapsed - (last.paused - first.paused)
         return {
             "rate_hz": came / elapsed if known else None,
             "rate_expected_hz": expected or None,
-            "rate_percent": 100.0 * came / elapsed / expected if known and expected else None,
+            "rate_percent": 100.0 * came / sending / expected
+            if known and expected and sending > 0.0
+            else None,
             "loss_percent": 100.0 * lost / (came + lost) if known and came + lost else None,
             "saturated_percent": 20.0 * (last.saturated - first.saturated) / came
             if known and came

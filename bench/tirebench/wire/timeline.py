@@ -158,6 +158,7 @@ class Timeline:
     ) -> None:
         self.counts = TimelineCounts()
         self.received = 0  # samples so far
+        self.paused = 0.0  # between segments that the wheel itself parted, by its clock, s
         self.wheel = wheel
         self._device = device
         self._segment = -1
@@ -245,6 +246,8 @@ class Timeline:
             self.counts.resets += 1
             elapsed = _signed_one(int(frame.t_us[0]) - self._wire_time, TIME_RANGE)
             self._time += elapsed if elapsed > 0 else self._frame_time
+            if why == "time_reset":
+                self.paused += 1e-6 * max(elapsed - self._frame_time, 0)
         self._segment += 1
         self._start = 0
         return self._block(frame, why)
