@@ -164,6 +164,12 @@ def test_a_shunt_gives_each_gage_its_gain(tmp_path: Path) -> None:
     assert "gage 1" in str(wrong.exception)
 
 
+def test_one_recording_where_two_are_needed_does_not_swallow_an_option(tmp_path: Path) -> None:
+    outcome = call("shunt", "--replay", "off.mcap", *SHUNT, "--out", tmp_path / "x.toml")
+    assert outcome.exit_code == 2
+    assert "--gage-resistance stands in the place of a recording; two are needed" in outcome.stderr
+
+
 def test_a_shunt_that_nobody_put_on_is_told() -> None:
     with pytest.raises(DeviceError, match=r"gage 4: a step of 2 microstrain") as refused:
         shunted(WHEEL, np.zeros(5), np.array([-900e-6, np.nan, -1e-3, 2e-6, -2e-3]), -1e-3)

@@ -10,7 +10,8 @@ import pytest
 from tests.bench.campaigns import tiny_runs
 from tirebench.emulator.emulator import Player, Tape, record_tape
 from tirebench.emulator.faults import Faults, parse_faults
-from tirebench.emulator.manoeuvre import Motion, nodes, read_manoeuvre, waveform
+from tirebench.emulator.manoeuvre import Motion, Rig, nodes, read_manoeuvre, waveform
+from tirebench.emulator.sources import manoeuvre_tape
 from tirebench.errors import DeviceError
 from tirebench.links.can_bus import packed
 from tirebench.protocols import CAN, SERIAL, SLCAN
@@ -176,6 +177,18 @@ def test_a_manoeuvre_is_solved_where_it_moves(tmp_path: Path) -> None:
     )
     table = read_manoeuvre(tmp_path / "m.csv").of_wheel(0)
     assert table == read.of_wheel(0)
+
+
+def test_each_solution_of_a_manoeuvre_is_told_while_it_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "m.toml").write_text(MANOEUVRE)
+    solved = (np.zeros((3600, 5)), 50.0, {"Fz": 4000.0})
+    monkeypatch.setattr(Rig, "_show", lambda rig, condition: solved)
+    told: list[str] = []
+    manoeuvre = read_manoeuvre(tmp_path / "m.toml")
+    manoeuvre_tape(manoeuvre, Device(), Faults({}), (0, 3), rate=1e4, progress=told.append)
+    assert told == [f"wheel {wheel}, {done} of 4" for wheel in (0, 3) for done in range(1, 5)]
 
 
 @pytest.mark.parametrize(

@@ -146,4 +146,4 @@ def test_a_campaign_with_too_few_runs_gets_no_verdict(
 def test_a_seed_below_zero_is_refused(model: Path) -> None:
     found = call("selftest", "anywhere", "--model", model, "--seed", -1)
     assert found.exit_code == 2
-    assert "-1 is not in the range x>=0" in found.output
+    assert "'-1' is given; a whole number, 0 or more, is needed" in found.output

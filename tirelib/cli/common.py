@@ -1,8 +1,10 @@
 """What several verbs share: paths that they read and write, JSON files, tables."""
 
 import os
+import re
 from difflib import get_close_matches
 from errno import ENOTDIR
+from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
@@ -12,6 +14,63 @@ from rich.console import Console
 
 from tirelib.core.documents import plain as plain
 from tirelib.core.documents import write_json as write_json
+
+
+def _range(limits: click.IntRange | click.FloatRange) -> str:
+    """Return the numbers that are allowed, in words; empty where all are."""
+    low, high = limits.min, limits.max
+    if low is not None and high is not None:
+        return f"{'above ' if limits.min_open else 'from '}{low:.6g} to {high:.6g}"
+    if low is not None:
+        return f"above {low:.6g}" if limits.min_open else f"{low:.6g} or more"
+    return "" if high is None else f"{high:.6g} or less"
+
+
+def _needed(value: Any, kind: str, limits: click.IntRange | click.FloatRange) -> str:
+    """Return what is wrong with the text of a number, and what is needed."""
+    text = str(value)
+    hint = ""
+    if "," in text:
+        hint = "; write a decimal point"
+    elif re.fullmatch(r"[+-]?\d[\d.]*\s*[^\d.\s].*", text):
+        hint = "; write the number alone, without its unit"
+    allowed = _range(limits)
+    return f"{text!r} is given; {kind}{f', {allowed},' if allowed else ''} is needed{hint}"
+
+
+class Real(click.FloatRange):
+    """A finite number within limits, which its help and its messages say in words."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number."""
+        try:
+            number = super().convert(value, param, ctx)
+        except click.BadParameter:
+            self.fail(_needed(value, "a number", self), param, ctx)
+        if not isfinite(number):
+            self.fail(_needed(value, "a finite number", self), param, ctx)
+        return number
+
+    def _describe_range(self) -> str:
+        return _range(self)
+
+
+class Whole(click.IntRange):
+    """A whole number within limits, which its help and its messages say in words."""
+
+    name = "whole number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter:
+            self.fail(_needed(value, "a whole number", self), param, ctx)
+
+    def _describe_range(self) -> str:
+        return _range(self)
 
 
 class NewPath(click.Path):

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tirelib.cli.common import NEW_FILE, output, write_json
+from tirelib.cli.common import NEW_FILE, Real, output, write_json
 from tirelib.cli.options import effects_option, json_option
 from tirelib.core.documents import new_file
 from tirelib.core.errors import CalibrationError
@@ -39,7 +39,7 @@ the points. The file has SI units and axes ISO 8855 (TYDEX W).
 @click.option(
     "--slip-angle",
     metavar="DEG",
-    type=float,
+    type=Real(),
     default=12.0,
     show_default=True,
     help="Largest slip angle at which the brush of a model is evaluated.",
@@ -47,7 +47,7 @@ the points. The file has SI units and axes ISO 8855 (TYDEX W).
 @click.option(
     "--slip-ratio",
     metavar="KAPPA",
-    type=float,
+    type=Real(),
     default=0.2,
     show_default=True,
     help="Largest slip ratio at which the brush of a model is evaluated.",
@@ -55,7 +55,7 @@ the points. The file has SI units and axes ISO 8855 (TYDEX W).
 @click.option(
     "--speed",
     metavar="KMH",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Real(min=0, min_open=True),
     default=60.0,
     show_default=True,
     help="Speed at which the brush of a model is evaluated, for effects that depend on it.",
@@ -63,7 +63,7 @@ the points. The file has SI units and axes ISO 8855 (TYDEX W).
 @click.option(
     "--radius",
     metavar="MM",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Real(min=0, min_open=True),
     help="Unloaded radius of the tire. Default: free_radius of the model or campaign.",
 )
 @effects_option

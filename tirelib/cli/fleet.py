@@ -14,7 +14,7 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from tirelib.cli.common import NEW_PLACE, output, write_json
+from tirelib.cli.common import NEW_PLACE, Whole, output, write_json
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import EVERY
 from tirelib.core.errors import TirelibError
@@ -96,7 +96,7 @@ def run_verb(command: Sequence[str]) -> tuple[int, str]:
 @click.option(
     "--workers",
     metavar="N",
-    type=click.IntRange(min=1),
+    type=Whole(min=1),
     help="Processes of the cluster on this machine. Default: one a processor.",
 )
 @click.option(

@@ -8,14 +8,7 @@ from typing import Any
 import click
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import (
-    CAMPAIGN,
-    FILE,
-    NEW_FILE,
-    NEW_FOLDER,
-    output,
-    write_json,
-)
+from tirelib.cli.common import CAMPAIGN, FILE, NEW_FILE, NEW_FOLDER, Real, Whole, output, write_json
 from tirelib.cli.estimate import exit_code, print_document
 from tirelib.cli.fmu_virtual import measure, virtual
 from tirelib.cli.options import json_option
@@ -116,7 +109,7 @@ fmu.add_command(measure)
 @click.option(
     "--samples-per-step",
     metavar="K",
-    type=int,
+    type=Whole(),
     default=1,
     show_default=True,
     help="Number of samples of each gage in one communication step: the step is K divided by the "
@@ -126,7 +119,7 @@ fmu.add_command(measure)
 @click.option(
     "--sample-rate",
     metavar="HZ",
-    type=float,
+    type=Real(),
     default=DEFAULT_RATE,
     show_default=True,
     help="Start value of the FMU's parameter of the same name.",

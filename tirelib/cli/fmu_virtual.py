@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from tirelib.cli.common import FILE, NEW_FILE, NEW_FOLDER, output
+from tirelib.cli.common import FILE, NEW_FILE, NEW_FOLDER, Real, Whole, output
 from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.core.errors import ParameterError
 from tirelib.fmu.parts import DEFAULT_RATE
@@ -31,7 +31,7 @@ needs nothing else where it runs (with --python: CPython with numpy and scipy).
 @click.option(
     "--samples-per-step",
     metavar="K",
-    type=int,
+    type=Whole(),
     default=10,
     show_default=True,
     help="Largest number of samples of each gage in one communication step. 10 are 1 ms at 10 kHz, "
@@ -40,7 +40,7 @@ needs nothing else where it runs (with --python: CPython with numpy and scipy).
 @click.option(
     "--sample-rate",
     metavar="HZ",
-    type=float,
+    type=Real(),
     default=DEFAULT_RATE,
     show_default=True,
     help="Start value of the FMU's parameter of the same name.",
@@ -111,7 +111,7 @@ of VirtualTire.fmu, not that of the numerical rig (`tirelib rig`), so it takes s
     "--seed",
     default=1,
     show_default=True,
-    type=click.IntRange(min=0),
+    type=Whole(min=0),
     help="Seed of one test day: noise, loads and gains.",
 )
 @click.option(

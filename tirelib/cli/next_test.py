@@ -10,12 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import (
-    CAMPAIGN,
-    FILE,
-    output,
-    write_json,
-)
+from tirelib.cli.common import CAMPAIGN, FILE, Real, output, write_json
 from tirelib.cli.diagnose import diagnosed
 from tirelib.cli.options import (
     effects_option,
@@ -70,7 +65,7 @@ def range_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add an option for the range of every condition that may be planned."""
     for name, text in reversed(RANGES.items()):
         command = click.option(
-            f"--{name.replace('_', '-')}-range", metavar="LOW HIGH", type=float, nargs=2, help=text
+            f"--{name.replace('_', '-')}-range", metavar="LOW HIGH", type=Real(), nargs=2, help=text
         )(command)
     return command
 
@@ -107,7 +102,7 @@ DIAGNOSIS = "tirelib-diagnosis/1"
     "--separation",
     "wanted",
     metavar="X",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Real(min=0, min_open=True),
     default=20.0,
     show_default=True,
     help="Separation for which repeats are counted.",

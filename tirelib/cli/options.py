@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from tirelib.cli.common import FILE, NEW_FILE, NEW_FOLDER
+from tirelib.cli.common import FILE, NEW_FILE, NEW_FOLDER, Real, Whole
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -59,7 +59,7 @@ false_alarm_option = click.option(
     "--false-alarm",
     "false_alarm",
     metavar="P",
-    type=click.FloatRange(min=0, max=0.5, min_open=True),
+    type=Real(min=0, max=0.5, min_open=True),
     default=0.05,
     show_default=True,
     help="Probability with which a tire that lacks nothing is said to lack something.",
@@ -69,7 +69,7 @@ false_alarm_option = click.option(
 seed_option = click.option(
     "--seed",
     metavar="N",
-    type=click.IntRange(min=0),
+    type=Whole(min=0),
     default=0,
     show_default=True,
     help="Seed of the variants.",
@@ -81,14 +81,14 @@ def low_pass_options(function: Callable[..., None]) -> Callable[..., None]:
     """Add the options that choose the low-pass."""
     function = click.option(
         "--cut-off",
-        type=float,
+        type=Real(),
         metavar="HZ",
         default=None,
         help="Fixed cut-off frequency instead; turns whose speed it does not suit are flagged.",
     )(function)
     return click.option(
         "--order",
-        type=float,
+        type=Real(),
         metavar="N",
         default=None,
         help="Cut-off of the low-pass filter in cycles per turn (default 24: 225 Hz at 65 km/h).",

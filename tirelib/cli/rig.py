@@ -7,7 +7,7 @@ import click
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from tirelib.cli.common import NEW_FOLDER, output, write_json
+from tirelib.cli.common import NEW_FOLDER, Real, Whole, output, write_json
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.core.errors import ParameterError
@@ -37,12 +37,12 @@ in SI and ISO signs.
     "--seed",
     default=0,
     show_default=True,
-    type=click.IntRange(min=0),
+    type=Whole(min=0),
     help="Seed of one test day: it changes noise and set-point errors, not the tire and the gages.",
 )
 @click.option(
     "--repeats",
-    type=click.IntRange(min=0),
+    type=Whole(min=0),
     metavar="K",
     help="Number of runs that are repeated at the end. [default: as in the plan]",
 )
@@ -56,14 +56,14 @@ in SI and ISO signs.
 )
 @click.option(
     "--friction",
-    type=float,
+    type=Real(),
     metavar="MU",
     help="Friction coefficient of the road in every run. [default: that of the tire]",
 )
 @click.option(
     "--tread-depth",
     "tread_depth_mm",
-    type=float,
+    type=Real(),
     metavar="MM",
     help="Depth of the tread grooves; a new tread has 8 mm. [default: 8]",
 )
@@ -83,7 +83,7 @@ in SI and ISO signs.
     help="Axis system of the files: iso, sae or adapted_sae.",
 )
 @click.option(
-    "--jobs", default=2, show_default=True, type=click.IntRange(min=1), help="Number of processes."
+    "--jobs", default=2, show_default=True, type=Whole(min=1), help="Number of processes."
 )
 @click.option("--force", is_flag=True, help="Write into a folder that is not empty.")
 @click.option("--list", "show_list", is_flag=True, help="List plans and tires, and stop.")

@@ -8,11 +8,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import (
-    CAMPAIGN,
-    output,
-    write_json,
-)
+from tirelib.cli.common import CAMPAIGN, Real, Whole, output, write_json
 from tirelib.cli.options import (
     effects_option,
     false_alarm_option,
@@ -49,7 +45,7 @@ Exit code: 0 done, 2 bad input.
     "--ratio",
     "ratios",
     metavar="X",
-    type=click.FloatRange(min=1.0, min_open=True),
+    type=Real(min=1.0, min_open=True),
     multiple=True,
     default=(1.05, 1.2, 1.5),
     show_default=True,
@@ -58,7 +54,7 @@ Exit code: 0 done, 2 bad input.
 @click.option(
     "--repeats",
     metavar="N",
-    type=click.IntRange(min=1),
+    type=Whole(min=1),
     default=30,
     show_default=True,
     help="Tires in which each effect is planted.",

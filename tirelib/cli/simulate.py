@@ -10,7 +10,7 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from tirelib.cli.common import NEW_FOLDER, output, write_json
+from tirelib.cli.common import NEW_FOLDER, Real, output, write_json
 from tirelib.cli.options import effects_option, json_option
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError, ParameterError
@@ -127,7 +127,7 @@ def _numbers(
 @click.option(
     "--damping",
     metavar="LAMBDA",
-    type=float,
+    type=Real(),
     help="Damping ratio lambda in c_n = 2 lambda sqrt(m_n k_n). Default: that of the tire.",
 )
 @json_option("the results")

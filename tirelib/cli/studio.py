@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from tirelib.cli.common import Whole
 from tirelib.cli.options import Decorator
 from tirelib.core.errors import ParameterError
 
@@ -56,7 +57,7 @@ def _session() -> Decorator:
     help="Folder in which campaigns may be chosen on the page; may be given several times. "
     "[default: the present folder and the user's home]",
 )
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port; 0 takes a free one.")
+@click.option("--port", type=Whole(0, 65535), default=0, help="Port; 0 takes a free one.")
 @click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
 def studio(
     folder: Path | None,

@@ -19,7 +19,8 @@ from tirebench.protocols.transmitter import FORMATS, transmitter
 from tirebench.wire.conditions import Conditions, conditions_document
 from tirebench.wire.device import Device, read_device
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import FILE, NEW_FILE, write_json
+from tirelib.cli.common import FILE, NEW_FILE, Real, Whole, write_json
+from tirelib.cli.progress import progress_bar, progress_options
 
 DRAIN = 600.0
 """At the end, the reader gets this long to take what was sent, [s]."""
@@ -67,7 +68,7 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     "--run",
     "numbers",
     metavar="N",
-    type=int,
+    type=Whole(),
     multiple=True,
     help="Number of a run to play; may be given several times, in the order of play.  [default: "
     "the first]",
@@ -85,7 +86,7 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     "--source",
     "number",
     metavar="N",
-    type=click.IntRange(min=0),
+    type=Whole(min=0),
     help="Number of the source to play, where the recording has several.",
 )
 @click.option(
@@ -93,7 +94,7 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     default=10_000.0,
     show_default=True,
     metavar="HZ",
-    type=click.FloatRange(153.0, 50_000.0),
+    type=Real(153.0, 50_000.0),
     help="Sample rate of the gages in a manoeuvre.",
 )
 @click.option(
@@ -136,7 +137,7 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     multiple=True,
     default=(0,),
     show_default=True,
-    type=click.IntRange(0, 255),
+    type=Whole(0, 255),
     help="Number of an emulated wheel; may be given up to four times.",
 )
 @click.option(
@@ -154,7 +155,7 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     "--speedup",
     default=1.0,
     show_default=True,
-    type=click.FloatRange(0.01, 1000.0),
+    type=Real(0.01, 1000.0),
     help="Play faster than real time by this factor.",
 )
 @click.option("--fault", "fault_texts", metavar="NAME[=VALUE]", multiple=True, help="See below.")
@@ -168,11 +169,11 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     help="How long to wait until a reader opens the port.",
 )
 @click.option("--after", metavar="F", type=FILE, help="Send nothing until this file exists.")
-@click.option("--unplug", metavar="S", type=float, help="Emulate a pulled cable after this time.")
+@click.option("--unplug", metavar="S", type=Real(), help="Emulate a pulled cable after this time.")
 @click.option(
     "--replug",
     metavar="S",
-    type=click.FloatRange(min=0.0),
+    type=Real(min=0.0),
     help="Plug the cable in again after this time, and repeat; needs --link.",
 )
 @click.option(
@@ -182,6 +183,7 @@ Exit code: 0 all was played to a reader, 1 nobody listened to some of it.
     type=NEW_FILE,
     help="Write counters of what was sent (JSON).",
 )
+@progress_options
 @click.pass_context
 def emulate(
     context: click.Context,
@@ -328,13 +330,16 @@ def _manoeuvre(
     seed: int,
     truth_file: Path | None,
 ) -> Tape:
-    from tirebench.emulator.manoeuvre import read_manoeuvre
+    from tirebench.emulator.manoeuvre import nodes, read_manoeuvre
     from tirebench.emulator.sources import manoeuvre_tape, write_truth
 
     manoeuvre = read_manoeuvre(file)
     device.check_layout(manoeuvre.tire.lateral.tolist(), str(file))
-    click.echo("solving the rig along the manoeuvre ...", err=True)
-    tape, motions = manoeuvre_tape(manoeuvre, device, faults, wheels, rate=rate, seed=seed)
+    count = sum(len(nodes(manoeuvre.of_wheel(wheel))) for wheel in wheels)
+    with progress_bar("solving the rig along the manoeuvre", count) as progress:
+        tape, motions = manoeuvre_tape(
+            manoeuvre, device, faults, wheels, rate=rate, seed=seed, progress=progress
+        )
     if truth_file is not None:
         write_truth(truth_file, motions)
     return tape

@@ -23,7 +23,7 @@ from tirebench.recording.recording import Recording
 from tirebench.recording.segments import Segment, segments
 from tirelib.campaign import CampaignHeader
 from tirelib.campaign.header import parse_header
-from tirelib.cli.common import FILE, NEW_FILE, NewPath, write_json
+from tirelib.cli.common import FILE, NEW_FILE, NewPath, Whole, write_json
 
 TABLES, MDF = (".csv", ".parquet"), ".mf4"
 
@@ -62,7 +62,7 @@ export, 2 bad input.
 )
 @click.option(
     "--wheel",
-    type=click.IntRange(0, 255),
+    type=Whole(0, 255),
     help="Number of the wheel to export.  [default: the first that sent frames]",
 )
 @click.option(

@@ -21,7 +21,7 @@ from tirebench.recording.link import ReplayLink
 from tirebench.setup.source_plan import SourcePlan, wheels_of
 from tirebench.wire.device import Device
 from tirebench.wire.timeline import Samples
-from tirelib.cli.common import NEW_FILE, output
+from tirelib.cli.common import NEW_FILE, Real, Whole, output
 from tirelib.core.arrays import FloatArray
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -40,7 +40,7 @@ _OPTIONS = (
     click.option(
         "--wheel",
         "number",
-        type=click.IntRange(0, 255),
+        type=Whole(0, 255),
         metavar="N",
         help="Number of the wheel, where several send.",
     ),
@@ -48,7 +48,7 @@ _OPTIONS = (
         "--seconds",
         default=3.0,
         show_default=True,
-        type=click.FloatRange(1.0, 600.0),
+        type=Real(1.0, 600.0),
         help="Duration of the mean.",
     ),
     click.option(
@@ -56,7 +56,7 @@ _OPTIONS = (
         default=1e6 * LARGEST_STANDING_RANGE,
         show_default=True,
         metavar="MICROSTRAIN",
-        type=click.FloatRange(min=0.0, min_open=True),
+        type=Real(min=0.0, min_open=True),
         help="A wheel whose strain varies by more than this counts as turning.",
     ),
     click.option(

@@ -8,7 +8,7 @@ from tirebench.errors import DeviceError
 from tirebench.protocols.bus_load import HIGHEST_MEAN, LoadPlan, highest_rate, load_of, suggestions
 from tirebench.protocols.layouts import RAW12, RAW12C, RAW16
 from tirebench.protocols.transmitter import SERIAL
-from tirelib.cli.common import NEW_FILE, write_json
+from tirelib.cli.common import NEW_FILE, Real, Whole, write_json
 
 _EXAMPLE = f"""\b
 Examples:
@@ -35,19 +35,19 @@ Exit code: 0 it fits, 1 it does not (a plan that would fit is printed), 2 bad in
     "--bitrate",
     default=500_000,
     show_default=True,
-    type=click.IntRange(min=1000),
+    type=Whole(min=1000),
     help="Bit rate of the CAN bus [bit/s].",
 )
 @click.option(
     "--data-bitrate",
-    type=click.IntRange(min=1000),
+    type=Whole(min=1000),
     help="Bit rate of the data phase of CAN FD [bit/s]. [default: 2000000]",
 )
 @click.option(
     "--baud",
     default=2_000_000,
     show_default=True,
-    type=click.IntRange(min=1200),
+    type=Whole(min=1200),
     help="Baud rate of the serial line.",
 )
 @click.option(
@@ -60,7 +60,7 @@ Exit code: 0 it fits, 1 it does not (a plan that would fit is printed), 2 bad in
     "--wheels",
     default=1,
     show_default=True,
-    type=click.IntRange(1, 8),
+    type=Whole(1, 8),
     help="Number of wheels that send on it.",
 )
 @click.option(
@@ -68,7 +68,7 @@ Exit code: 0 it fits, 1 it does not (a plan that would fit is printed), 2 bad in
     default=10_000.0,
     show_default=True,
     metavar="HZ",
-    type=click.FloatRange(153.0, 200_000.0),
+    type=Real(153.0, 200_000.0),
     help="Sample rate of the gages.",
 )
 @click.option(

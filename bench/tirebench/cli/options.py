@@ -10,7 +10,7 @@ from tirebench.errors import DeviceError
 from tirebench.links.opening import BITRATE
 from tirebench.protocols.plan import RATE
 from tirebench.wire.device import Device, read_device
-from tirelib.cli.common import FILE
+from tirelib.cli.common import FILE, Real, Whole
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -27,19 +27,19 @@ _PORT_OPTIONS = (
         "--baud",
         default=2_000_000,
         show_default=True,
-        type=click.IntRange(min=1200),
+        type=Whole(min=1200),
         help="Baud rate of a serial port.",
     ),
     click.option(
         "--bitrate",
         default=BITRATE,
         show_default=True,
-        type=click.IntRange(min=1000),
+        type=Whole(min=1000),
         help="Bit rate of a CAN bus [bit/s].",
     ),
     click.option(
         "--data-bitrate",
-        type=click.IntRange(min=1000),
+        type=Whole(min=1000),
         help="Bit rate of the data phase of CAN FD [bit/s].  [default: classic CAN]",
     ),
     click.option(
@@ -54,7 +54,7 @@ _PORT_OPTIONS = (
         default=RATE,
         show_default=True,
         metavar="HZ",
-        type=click.FloatRange(153.0, 200_000.0),
+        type=Real(153.0, 200_000.0),
         help="Sample rate of the gages on CAN; a SERIAL v1 frame states its own rate.",
     ),
     click.option(
@@ -69,7 +69,7 @@ _PORT_OPTIONS = (
         default=60.0,
         show_default=True,
         metavar="S",
-        type=click.FloatRange(min=0.0),
+        type=Real(min=0.0),
         help="How long a port may be disconnected before the run ends.",
     ),
 )
@@ -93,14 +93,14 @@ sidecar_option = click.option(
 """Conditions over time."""
 
 duration_option = click.option(
-    "--duration", metavar="S", type=click.FloatRange(min=0.0), help="End after this time."
+    "--duration", metavar="S", type=Real(min=0.0), help="End after this time."
 )
 """An end by time."""
 
 silence_option = click.option(
     "--silence",
     metavar="S",
-    type=click.FloatRange(min=0.0),
+    type=Real(min=0.0),
     help="End when nothing came for this time, counted from the first byte; before it, only "
     "--duration and Ctrl-C end.",
 )
@@ -116,7 +116,7 @@ trust_option = click.option(
 pace_option = click.option(
     "--pace",
     metavar="X",
-    type=click.FloatRange(0.001, 1000.0),
+    type=Real(0.001, 1000.0),
     help="Replay speed as a multiple of real time. [default: as fast as possible]",
 )
 """How fast a recording is read."""

@@ -18,7 +18,7 @@ from tirebench.page.feed import About
 from tirebench.page.live import LOOPBACK, LivePage, PageChoice
 from tirebench.wire.conditions import Conditions
 from tirebench.wire.device import Device
-from tirelib.cli.common import FILE
+from tirelib.cli.common import FILE, Whole
 from tirelib.estimators.calibration import Calibration
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -46,7 +46,7 @@ _OPTIONS = (
     click.option(
         "--page-port",
         default=0,
-        type=click.IntRange(0, 65535),
+        type=Whole(0, 65535),
         metavar="N",
         help="TCP port of the page. [default: any free port]",
     ),

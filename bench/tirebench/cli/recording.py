@@ -11,6 +11,7 @@ import click
 from tirebench.live.reader import ReaderPlan
 from tirebench.live.recording_state import RecordingRule
 from tirebench.live.space import free_at
+from tirelib.cli.common import Real
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -30,13 +31,13 @@ _OPTIONS = (
     click.option(
         "--split-minutes",
         metavar="MIN",
-        type=click.FloatRange(min=0.01),
+        type=Real(min=0.01),
         help="Start a new part of the recording after this time.",
     ),
     click.option(
         "--split-mb",
         metavar="MB",
-        type=click.FloatRange(min=0.1),
+        type=Real(min=0.1),
         help="Start a new part of the recording when a part reaches this size.",
     ),
     click.option(

@@ -6,7 +6,7 @@ import click
 
 from tirebench.cli.options import pace_option, trust_option
 from tirebench.cli.run import run
-from tirelib.cli.common import FILE, NEW_FILE
+from tirelib.cli.common import FILE, NEW_FILE, Whole
 
 _EXAMPLE = """\b
 Examples:
@@ -36,7 +36,7 @@ Exit code: as for `tirebench run`.
     "--wheel",
     "numbers",
     multiple=True,
-    type=click.IntRange(0, 255),
+    type=Whole(0, 255),
     help="Numbers of the wheels to estimate. [default: as in the run]",
 )
 @click.option(

@@ -58,7 +58,7 @@ from tirebench.recording.link import ReplayLink
 from tirebench.recording.new_file import keep_recordings
 from tirebench.recording.replay import ReplayChain
 from tirebench.setup.source_plan import SourcePlan, wheels_of
-from tirelib.cli.common import FILE, NEW_FILE, output
+from tirelib.cli.common import FILE, NEW_FILE, Real, Whole, output
 
 _EXAMPLE = f"""\b
 Examples:
@@ -97,7 +97,7 @@ the run in good order.
 @click.option(
     "--wait",
     metavar="[S]",
-    type=click.FloatRange(min=0.0),
+    type=Real(min=0.0),
     default=0.0,
     is_flag=False,
     flag_value=60.0,
@@ -114,9 +114,9 @@ the run in good order.
     help="FMU of the estimator, made by `tirelib fmu build`; each wheel gets its own instance.",
 )
 @trust_option
-@click.option("--speed", metavar="KMH", type=float, help="Travel speed.")
-@click.option("--pressure", metavar="BAR", type=click.FloatRange(min=0.0), help="Gauge pressure.")
-@click.option("--camber", metavar="DEG", type=float, help="Camber angle (ISO 8855 signs).")
+@click.option("--speed", metavar="KMH", type=Real(), help="Travel speed.")
+@click.option("--pressure", metavar="BAR", type=Real(min=0.0), help="Gauge pressure.")
+@click.option("--camber", metavar="DEG", type=Real(), help="Camber angle (ISO 8855 signs).")
 @click.option(
     "--condition",
     "named",
@@ -137,7 +137,7 @@ the run in good order.
     "--wheel",
     "numbers",
     multiple=True,
-    type=click.IntRange(0, 255),
+    type=Whole(0, 255),
     help="Numbers of the wheels to estimate. [default: the first four that send frames]",
 )
 @port_options
@@ -157,9 +157,7 @@ the run in good order.
 )
 @duration_option
 @silence_option
-@click.option(
-    "--turns", metavar="N", type=click.IntRange(min=1), help="End after this number of turns."
-)
+@click.option("--turns", metavar="N", type=Whole(min=1), help="End after this number of turns.")
 @click.option(
     "--every-turn",
     is_flag=True,

@@ -1,13 +1,14 @@
 """``tirebench shunt``: the gain of each gage from a known resistor in parallel to it."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from tirebench.cli.gathering import PORTS, asked, gathering_options
 from tirebench.links.opening import PortPlan
 from tirebench.wire.gage_setup import apparent_strain, shunted, write_device
-from tirelib.cli.common import FILE
+from tirelib.cli.common import Real, Whole
 
 _EXAMPLE = f"""\b
 Examples:
@@ -28,13 +29,28 @@ Exit code: 0 done, 2 bad input, or the step of the shunt is not in the data.
 """
 
 
+class Recording(click.Path):
+    """One of the two recordings; an option in its place means that one was left out."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path."""
+        if str(value).startswith("--"):
+            self.fail(
+                f"{value} stands in the place of a recording; two are needed, the first without "
+                "the shunt and the second with it: --replay OFF.mcap ON.mcap",
+                param,
+                ctx,
+            )
+        return super().convert(value, param, ctx)
+
+
 @click.command(epilog=_EXAMPLE)
 @gathering_options
 @click.option(
     "--replay",
     nargs=2,
     metavar="OFF.mcap ON.mcap",
-    type=FILE,
+    type=Recording(path_type=Path, dir_okay=False),
     help="Two recordings, without and with the shunt, instead of a port.",
 )
 @click.option(
@@ -42,7 +58,7 @@ Exit code: 0 done, 2 bad input, or the step of the shunt is not in the data.
     "gage_ohm",
     required=True,
     metavar="OHM",
-    type=click.FloatRange(1.0, 1e5),
+    type=Real(1.0, 1e5),
     help="Resistance Rg of the gage, such as 350.",
 )
 @click.option(
@@ -50,7 +66,7 @@ Exit code: 0 done, 2 bad input, or the step of the shunt is not in the data.
     "shunt_ohm",
     required=True,
     metavar="OHM",
-    type=click.FloatRange(10.0, 1e8),
+    type=Real(10.0, 1e8),
     help="Resistance Rs of the shunt, such as 100000.",
 )
 @click.option(
@@ -58,13 +74,13 @@ Exit code: 0 done, 2 bad input, or the step of the shunt is not in the data.
     "factor",
     required=True,
     metavar="KS",
-    type=click.FloatRange(0.1, 300.0),
+    type=Real(0.1, 300.0),
     help="Gage factor Ks.",
 )
 @click.option(
     "--gage",
     "gages",
-    type=click.IntRange(1),
+    type=Whole(1),
     multiple=True,
     metavar="N",
     help="Number of a shunted gage; may be given several times.  [default: all]",

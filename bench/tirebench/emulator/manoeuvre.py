@@ -22,7 +22,7 @@ wheel angle. The rig is steady at each of them: transients of the tire (relaxati
 import csv
 import math
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -258,9 +258,17 @@ class Rig:
         self._known: dict[Condition, tuple[FloatArray, float, dict[str, float]]] = {}
         self._last: RigState | None = None
 
-    def motion(self, path: Sequence[Point]) -> Motion:
-        """Return what a wheel shows at each node of its path."""
-        shown = [self._show(point.condition) for point in path]
+    def motion(
+        self, path: Sequence[Point], progress: Callable[[int, int], None] = lambda done, of: None
+    ) -> Motion:
+        """Return what a wheel shows at each node of its path.
+
+        `progress` is told how many of how many nodes are solved.
+        """
+        shown = []
+        for done, point in enumerate(path, start=1):
+            shown.append(self._show(point.condition))
+            progress(done, len(path))
         return Motion(
             time=np.array([point.time for point in path]),
             omega=np.array([omega for _, omega, _ in shown]),

@@ -1,6 +1,6 @@
 """What an emulator can play: runs of a campaign, a manoeuvre on the rig, a recording as it is."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -53,17 +53,19 @@ def manoeuvre_tape(
     *,
     rate: float,
     seed: int = 0,
+    progress: Callable[[str], None] = lambda label: None,
 ) -> tuple[Tape, dict[int, Motion]]:
     """Solve the rig along a manoeuvre and return what the wheels send, and the truth of each.
 
-    All of it is solved and put into counts beforehand, so that playing costs little.
+    All of it is solved and put into counts beforehand, so that playing costs little. `progress` is
+    told after each node that is solved.
     """
     rig = Rig(manoeuvre.tire)
     period = round(1.0 / (rate * TICK))
     records, motions = [], {}
     for wheel in wheels:
         path = nodes(manoeuvre.of_wheel(wheel))
-        motion = rig.motion(path)
+        motion = rig.motion(path, lambda done, of, w=wheel: progress(f"wheel {w}, {done} of {of}"))
         strain = waveform(motion, manoeuvre.tire, 1.0 / (period * TICK), seed=seed + wheel)
         counts, marked = device.counts(strain)
         struck, bits = faults.gages(counts, period * TICK, device.scale)
