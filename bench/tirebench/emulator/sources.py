@@ -65,7 +65,7 @@ def manoeuvre_tape(
     records, motions = [], {}
     for wheel in wheels:
         path = nodes(manoeuvre.of_wheel(wheel))
-        motion = rig.motion(path, lambda done, of, w=wheel: progress(f"wheel {w}, {done} of {of}"))
+        motion = rig.motion(path, _solved(wheel, progress))
         strain = waveform(motion, manoeuvre.tire, 1.0 / (period * TICK), seed=seed + wheel)
         counts, marked = device.counts(strain)
         struck, bits = faults.gages(counts, period * TICK, device.scale)
@@ -75,6 +75,10 @@ def manoeuvre_tape(
     duration = max(len(record.counts) for record in records) * period * TICK
     conditions = _conditions(motions[wheels[0]], alone=len(wheels) == 1)
     return Tape(tuple(records), conditions, duration + 0.1), motions
+
+
+def _solved(wheel: int, progress: Callable[[str], None]) -> Callable[[int, int], None]:
+    return lambda done, of: progress(f"wheel {wheel}, {done} of {of}")
 
 
 def _conditions(motion: Motion, *, alone: bool) -> Conditions:
