@@ -17,7 +17,7 @@ def parts() -> list[dict[str, Any]]:
 
 def plots() -> list[str]:
     """Return the names of the plots, each once."""
-    return [e["plot"] for part in parts() for e in part["equation"] if "plot" in e]
+    return sorted({e["plot"] for part in parts() for e in part["equation"]})
 
 
 def numbered(numbers: str) -> str:
@@ -59,8 +59,7 @@ def _section(part: dict[str, Any]) -> Iterator[str]:
         yield f"**Code:** {', '.join(_code(name) for name in e['code'])}\n"
         yield "**Tests:**\n"
         yield "\n".join(f"- {_test(name)}" for name in e["tests"]) + "\n"
-        if "plot" in e:
-            yield f"![{e['name']}](/_generated/plots/{e['plot']}.png)\n"
+        yield f"![{e['name']}](/_generated/plots/{e['plot']}.png)\n"
 
 
 def _set(text: str) -> str:

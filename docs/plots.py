@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from plots_laws import LAWS
 
 from tirelib.core.parameters import read_tire
 from tirelib.effects import CATALOGUE
@@ -292,6 +293,7 @@ PLOTS: dict[str, tuple[int, Callable[[Panels], None]]] = {
     "rolling_pressure": (1, rolling_pressure),
     "sheared_tread": (1, sheared_tread),
     "plain_tires": (1, plain_tires),
+    **LAWS,
 }
 """Panels of each plot, and what draws them; `plot` in `theory/equations.toml` names one, and
 `theory/inference.md` the last."""

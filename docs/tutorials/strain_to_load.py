@@ -127,7 +127,8 @@ fig.tight_layout()
 # --------------
 #
 # - Your own files: :doc:`own_measurements`.
-# - Which quantities, which laws, where they stop: :doc:`/theory/estimators`.
+# - Which quantities and which laws: :doc:`/theory/estimators`; where they stop:
+#   :doc:`/reference/validity`.
 # - The same estimates live in a vehicle model: :doc:`vehicle_loop`; on a test bench:
 #   :doc:`bench_transmitter`.
 # - What these figures are worth on a real tire: :doc:`/theory/limits`.

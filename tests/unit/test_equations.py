@@ -102,3 +102,9 @@ def test_every_equation_that_a_docstring_cites_is_listed() -> None:
 def test_an_equation_is_listed_once() -> None:
     every = [n for equation in LISTED for n in expanded(equation["numbers"])]
     assert sorted(every) == sorted({*every})
+
+
+def test_every_equation_has_its_law_symbols_range_test_and_plot() -> None:
+    needed = {"numbers", "name", "law", "symbols", "valid", "code", "tests", "plot"}
+    lacking = {each["numbers"]: needed - each.keys() for each in LISTED if needed - each.keys()}
+    assert lacking == {}

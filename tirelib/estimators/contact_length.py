@@ -7,7 +7,7 @@ The length is the angle times the effective rolling radius, which holds under sl
 The correction is that of the rig's tires (`reference`, `soft` and `stiff` over the plans `set1` and
 `set3`): 1.7 mm rms are left of 4,440 lengths. Nobody measures a length of contact on a road, so it
 is not fitted to a tire. ``python build/signal_constants.py`` fits the constants anew, tire by tire,
-and shows half and double of each; ``docs/theory/signal.md`` has the table.
+and shows half and double of each; ``docs/theory/signal_numbers.md`` has the table.
 """
 
 import numpy as np
