@@ -20,7 +20,8 @@ from tirelib.measured.signal.contacts import Contact, ContactFinder
 from tirelib.measured.signal.lowpass import LowPass
 from tirelib.measured.signal.turns import TurnCutter
 
-_BUFFER = "_buffer"
+_OWN = ("_finder", "_samples")
+"""What a cutter consists of that has a state of its own."""
 
 
 def to_plain(value: Any) -> Any:
@@ -78,15 +79,11 @@ def from_plain(plain: Any) -> Any:
 
 
 def snapshot_cutter(cutter: TurnCutter) -> dict[str, Any]:
-    """Return the state of a cutter: its finder, and of its buffer what is still needed."""
-    state = {
-        name: to_plain(value)
-        for name, value in vars(cutter).items()
-        if name not in (_BUFFER, "_finder")
-    }
+    """Return the state of a cutter: its finder, and the samples that it still needs."""
+    state = {name: to_plain(value) for name, value in vars(cutter).items() if name not in _OWN}
     finder = vars(cutter)["_finder"]
     state["_finder"] = {name: to_plain(value) for name, value in vars(finder).items()}
-    state["_samples"] = to_plain(cutter.needed())
+    state["_samples"] = to_plain((cutter.needed(), cutter.taken))
     return state
 
 
@@ -94,11 +91,11 @@ def restore_cutter(cutter: TurnCutter, state: dict[str, Any]) -> None:
     """Bring a new cutter of the same rate and gages into a saved state."""
     finder = vars(cutter)["_finder"]
     for name, value in state.items():
-        if name not in ("_finder", "_samples"):
+        if name not in _OWN:
             setattr(cutter, name, from_plain(value))
     for name, value in state["_finder"].items():
         setattr(finder, name, from_plain(value))
-    cutter.refill(from_plain(state["_samples"]))
+    cutter.refill(*from_plain(state["_samples"]))
 
 
 _CONTAINERS: dict[str, Callable[[list[Any]], Any]] = {"list": list, "tuple": tuple, "deque": deque}

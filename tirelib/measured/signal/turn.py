@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.flags import TurnFlag
 from tirelib.core.traces import Conditions, StrainTrace
 
 PHI = np.linspace(-1.0, 0.8, 361)
@@ -87,6 +88,17 @@ class Turns:
 
     def __len__(self) -> int:
         return int(self.time.shape[0])
+
+
+def unknown_turn(time: float, ready: float, gages: int, flags: TurnFlag) -> Turn:
+    """Return the turn of a contact without a preceding turn: its values are unknown."""
+    values = {field.name: np.nan for field in fields(Turn)}
+    rows = dict.fromkeys(("offset", "offset_std", "mean"), np.full(gages, np.nan))
+    curves = dict.fromkeys(("strain", "rate"), np.full((gages, PHI.size), np.nan))
+    known = {"time": time, "ready": ready, "flags": int(flags)}
+    return Turn(
+        **{**values, **rows, **curves, **known, "gage_flags": np.zeros(gages, dtype=np.int64)}
+    )
 
 
 def stack_turns(turns: Sequence[Turn], lateral: FloatArray, rate: float) -> Turns:

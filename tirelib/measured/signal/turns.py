@@ -16,7 +16,6 @@ whole record, by the compiled core where there is one; both agree to 1e-9, flags
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Unpack
 
 import numpy as np
@@ -25,15 +24,17 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.compiled import loaded_core, memory
 from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.core.flags import TurnFlag
-from tirelib.core.held import HELD, Held
-from tirelib.measured.signal.angle import SOURCES, AngleLaw, Past, angle_law, minmod
+from tirelib.core.held import Held
+from tirelib.measured.signal.angle import SOURCES, AngleLaw, Past, angle_law
 from tirelib.measured.signal.compiled import Record, cut_by_core
 from tirelib.measured.signal.contacts import NEAR_EDGE, Contact, ContactFinder
 from tirelib.measured.signal.course import course
 from tirelib.measured.signal.lowpass import LowPass, half_width, smooth_to_angle
+from tirelib.measured.signal.offset import nothing_read, offset_at
 from tirelib.measured.signal.quality import UNUSABLE, inspect, without_contact
+from tirelib.measured.signal.samples import Samples
 from tirelib.measured.signal.slip import NOTHING, Rolled, pull, unseen_by_load, unseen_by_traction
-from tirelib.measured.signal.turn import PHI, Turn, Turns, stack_turns
+from tirelib.measured.signal.turn import PHI, Turn, Turns, stack_turns, unknown_turn
 
 __all__ = ["PHI", "Turn", "TurnCutter", "Turns", "cut_turns", "stack_turns"]
 
@@ -41,8 +42,6 @@ AFTER = np.deg2rad(20.0)
 """Wheel angle after the end of the pulse up to which a turn is evaluated, [rad]."""
 OFFSET_HALF_WIDTH = 0.5
 """Half-width of the sector opposite the contact from which the offset is taken, [rad]."""
-LARGEST_MISSING = 0.1
-"""Share of missing samples with which an offset or a mean is still formed."""
 LARGEST_PERIOD_RATIO = 2.0
 DRIFT_SHARE = 0.05
 MISSED_RATIO = 1.5
@@ -89,14 +88,11 @@ class TurnCutter:
         longest = int(LONGEST_TURN * rate)
         self._finder = ContactFinder(longest)
         self._keep = 2 * longest
-        # rows: gages, then the held conditions, then the trigger
-        self._buffer = np.full((self._gages + len(HELD) + 1, 2 * self._keep), np.nan)
-        self._filled = 0
-        self._base = 0  # sample number of the buffer's first column
+        self._samples = Samples(self._gages, self._centre, 2 * self._keep)
         self._waiting: deque[Contact] = deque()
         self._previous: Contact | None = None
         self._previous_period = np.nan
-        self._offsets = self._nothing_read()
+        self._offsets = nothing_read(self._gages)
         self._past: Past = ()
         self._rolled: Rolled = NOTHING  # in the contact before
 
@@ -122,13 +118,7 @@ class TurnCutter:
         turns: list[Turn] = []
         for start in range(0, strain.shape[1], self._keep):
             part = slice(start, min(start + self._keep, strain.shape[1]))
-            n = part.stop - part.start
-            columns = self._room(n)
-            self._buffer[: self._gages, columns] = strain[:, part]
-            for row, name in enumerate(HELD, start=self._gages):
-                value = held.get(name, np.nan)
-                self._buffer[row, columns] = value[part] if isinstance(value, np.ndarray) else value
-            self._buffer[-1, columns] = np.nan if trigger is None else trigger[part]
+            self._samples.take(strain, held, trigger, part, self._oldest())
             self._waiting.extend(self._finder.push(strain[self._centre, part]))
             while self._waiting:
                 turn = self._next_turn()
@@ -137,50 +127,45 @@ class TurnCutter:
                 turns.append(turn)
         return turns
 
-    def _room(self, n: int) -> slice:
-        """Make room for n samples and return their columns."""
-        if self._filled + n > self._buffer.shape[1]:
-            drop = max(self._oldest() - self._base, self._filled + n - self._buffer.shape[1])
-            self._buffer[:, : self._filled - drop] = self._buffer[:, drop : self._filled]
-            self._filled -= drop
-            self._base += drop
-        columns = slice(self._filled, self._filled + n)
-        self._filled += n
-        return columns
-
     def _oldest(self) -> int:
         """Return the number of the first sample that a turn still to come may need."""
         first = self._finder.oldest
         if self._waiting and self._previous is not None:
             first = min(first, int(self._previous.middle) - 1)
         first -= NEAR_EDGE  # they tell whether the contact is damaged
-        return max(self._base, min(first, self._base + self._filled))
+        return max(self._samples.base, min(first, self._samples.end))
 
     def needed(self) -> FloatArray:
         """Return the samples that turns to come may need, newest last, conditions below."""
-        return self._buffer[:, self._oldest() - self._base : self._filled].copy()
+        return self._samples.since(self._oldest())
 
-    def refill(self, samples: FloatArray) -> None:
-        """Restore the samples that `needed` returned; everything else is as it was then."""
-        self._base += self._filled - samples.shape[1]
-        self._filled = samples.shape[1]
-        self._buffer[:, : self._filled] = samples
+    def refill(self, samples: FloatArray, end: int) -> None:
+        """Restore the samples that `needed` returned when `end` samples had come."""
+        self._samples.refill(samples, end)
+
+    @property
+    def taken(self) -> int:
+        """Number of samples that have come."""
+        return self._samples.end
 
     def _next_turn(self) -> Turn | None:
         """Work on the first waiting contact; None while its samples are not all there."""
         contact, before = self._waiting[0], self._previous
         if contact.fresh or before is None:
             self._waiting.popleft()
-            self._previous = self._inspected(contact)
+            self._previous = self._samples.inspected(contact)
             self._previous_period, self._past = np.nan, ()
-            self._offsets = self._nothing_read()
+            self._offsets = nothing_read(self._gages)
             self._rolled = NOTHING
-            return self._first_turn(contact)
+            flags = TurnFlag.FIRST_TURN | (TurnFlag.SPIKE if contact.burst else TurnFlag(0))
+            return unknown_turn(
+                contact.middle / self.rate, contact.fall / self.rate, self._gages, flags
+            )
         law, stop = self._needs(contact, before)
-        if law is None or stop > self._base + self._filled:
+        if law is None or stop > self._samples.end:
             return None
         self._waiting.popleft()
-        contact = self._inspected(contact)
+        contact = self._samples.inspected(contact)
         self._previous = contact
         turn = self._full_turn(contact, before, law, stop)
         self._previous_period = contact.middle - before.middle
@@ -194,7 +179,7 @@ class TurnCutter:
         if not self._waiting or self._previous is None:
             return None
         stop = self._needs(self._waiting[0], self._previous)[1]
-        return stop - self._base - self._filled
+        return stop - self._samples.end
 
     def _needs(self, contact: Contact, before: Contact) -> tuple[AngleLaw | None, int]:
         """Return the law of a turn's wheel angle, and the sample after the last one that it needs.
@@ -205,14 +190,11 @@ class TurnCutter:
         turn = contact.middle - before.middle
         steady = angle_law(contact.middle, turn, 0.0, {}, ())
         stop = self._stop(contact, steady)
-        if stop > self._base + self._filled:
+        if stop > self._samples.end:
             return None, stop
         first = int(np.ceil(before.middle))
-        seen = slice(max(first - self._base, 0), stop - self._base)
         courses = {
-            name: course(
-                self._buffer[self._gages + HELD.index(name), seen], first - contact.middle, turn
-            )
+            name: course(self._samples.held(name, first, stop), first - contact.middle, turn)
             for name in SOURCES
         }
         law = angle_law(
@@ -238,48 +220,6 @@ class TurnCutter:
         end = float(seen[-1] if seen.size else PHI[0])
         return int(law.sample(end + half_width(sigma)) + 2.0) + 1
 
-    def _inspected(self, contact: Contact) -> Contact:
-        """Return a contact as damaged where samples of the centre gage are missing at its ends."""
-        for edge in (contact.rise, contact.fall):
-            near = int(edge) - self._base
-            part = self._buffer[self._centre, max(near - NEAR_EDGE, 0) : near + 2]
-            if not np.isfinite(part).all():
-                return replace(contact, damaged=True)
-        return contact
-
-    def _gap_between(self, before: Contact, contact: Contact) -> bool:
-        """Tell whether samples of the centre gage are missing between two contacts."""
-        a, b = int(before.fall) - self._base, int(contact.rise) - self._base
-        return not np.isfinite(self._buffer[self._centre, max(a, 0) : b]).all()
-
-    def _first_turn(self, contact: Contact) -> Turn:
-        """Return the turn of a contact without a preceding turn: its values are unknown."""
-        unknown = np.full(self._gages, np.nan)
-        empty = np.full((self._gages, PHI.size), np.nan)
-        return Turn(
-            time=contact.middle / self.rate,
-            ready=contact.fall / self.rate,
-            period=np.nan,
-            omega=np.nan,
-            angle_std=np.nan,
-            slip_std=np.nan,
-            pulse=np.nan,
-            axis_shift=np.nan,
-            speed=np.nan,
-            pressure=np.nan,
-            camber=np.nan,
-            friction=np.nan,
-            tread_depth=np.nan,
-            tread_temperature=np.nan,
-            offset=unknown,
-            offset_std=unknown,
-            mean=unknown,
-            strain=empty,
-            rate=empty,
-            gage_flags=np.zeros(self._gages, dtype=np.int64),
-            flags=int(TurnFlag.FIRST_TURN | (TurnFlag.SPIKE if contact.burst else 0)),
-        )
-
     def _full_turn(self, contact: Contact, before: Contact, law: AngleLaw, stop: int) -> Turn:
         period = contact.middle - before.middle
         sigma = self._sigma(law)
@@ -291,7 +231,7 @@ class TurnCutter:
             flags |= TurnFlag.ACCELERATING
         if sigma is None:
             flags |= TurnFlag.CUT_OFF
-        missed = ratio > MISSED_RATIO and self._gap_between(before, contact)
+        missed = ratio > MISSED_RATIO and self._samples.gap_between(before, contact)
         if contact.damaged or before.damaged or missed:
             flags |= TurnFlag.FIRST_TURN | TurnFlag.GAP  # its period is unknown
         if contact.burst or (before.burst and before.damaged):
@@ -301,9 +241,9 @@ class TurnCutter:
             flags |= TurnFlag.ACCELERATING  # so much that its angle is unknown
         strain, rate, gage_flags = self._window(law, sigma, pulse, stop)
         sector = (law.sample(-np.pi + side * OFFSET_HALF_WIDTH) for side in (-1.0, 1.0))
-        opposite, gap = self._mean(slice(0, self._gages), *sector, robust=True)
-        offset, offset_std, moved = self._offset(opposite, law)
-        mean, gap_in_turn = self._mean(slice(0, self._gages), before.middle, contact.middle)
+        opposite, gap = self._samples.mean_strain(*sector, robust=True)
+        offset, offset_std, moved, self._offsets = offset_at(self._offsets, opposite, law)
+        mean, gap_in_turn = self._samples.mean_strain(before.middle, contact.middle)
         gage_flags[gap | gap_in_turn] |= int(TurnFlag.GAP)
         unusable = (gage_flags & int(UNUSABLE)) != 0
         strain -= offset[:, None]
@@ -312,10 +252,7 @@ class TurnCutter:
         swing = np.fmax.reduce(strain, axis=1, initial=0.0)
         swing -= np.fmin.reduce(strain, axis=1, initial=0.0)
         gage_flags[~unusable & (np.abs(moved) > DRIFT_SHARE * swing)] |= int(TurnFlag.DRIFT)
-        conditions, _ = self._mean(
-            slice(self._gages, self._gages + len(HELD)), before.middle, contact.middle
-        )
-        known = dict(zip(HELD, conditions.tolist(), strict=True))
+        known = self._samples.conditions(before.middle, contact.middle)
         speed = known["speed"]
         turned = np.abs(known["omega"]) * period / (2.0 * np.pi * self.rate)
         if not flags & TurnFlag.FIRST_TURN and (
@@ -325,8 +262,7 @@ class TurnCutter:
         ):
             flags |= TurnFlag.OMEGA_MISMATCH
         camber, friction = (
-            self._in_contact(self._gages + HELD.index(name), contact)
-            for name in ("camber", "friction")
+            self._samples.in_contact(name, contact) for name in ("camber", "friction")
         )
         if not np.isfinite(speed) or speed == 0.0:
             flags |= TurnFlag.NO_SPEED
@@ -381,29 +317,6 @@ class TurnCutter:
             self._rolled = rolled
         return float(np.hypot(law.slip_std, law.late * unseen))
 
-    def _nothing_read(self) -> FloatArray:
-        """Return times and offsets of two turns, shape (2, 2, n_gages), none of them known."""
-        return np.full((2, 2, self._gages), np.nan)
-
-    def _offset(
-        self, opposite: FloatArray, law: AngleLaw
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the offset at the contact, its std, and how it moved since it was last read.
-
-        What is read half a turn before the contact moves on until there: the hoop strain with the
-        square of the turn rate, the gage's zero with its temperature. It is followed as the turn
-        rate is, see `tirelib.measured.signal.angle`. Each gage is compared with the last turns in
-        which its samples are not missing there.
-        """
-        time = np.where(np.isnan(opposite), np.nan, law.sample(-np.pi))
-        (first, last), now = self._offsets, np.array([time, opposite])
-        self._offsets = np.where(np.isnan(now), self._offsets, [last, now])
-        moved, before = np.nan_to_num(opposite - last[1]), np.nan_to_num(last[1] - first[1])
-        share = np.nan_to_num((law.middle - time) / (time - last[0]))
-        followed = minmod(moved, before)
-        left = np.where(np.isnan(opposite), np.nan, share * np.abs(moved - followed))
-        return opposite + share * followed, left, moved
-
     def _window(
         self, law: AngleLaw, sigma: float | None, pulse: float, stop: int
     ) -> tuple[FloatArray, FloatArray, IntArray]:
@@ -413,49 +326,21 @@ class TurnCutter:
         if sigma is None or np.isnan(pulse):
             return strain, rate, np.zeros(self._gages, dtype=np.int64)
         seen = pulse + AFTER >= PHI
-        first = max(int(law.sample(PHI[0] - half_width(sigma)) - 2.0), self._base)
-        raw = self._buffer[: self._gages, first - self._base : stop - self._base]
-        mended, gage_flags = inspect(raw, law.step)
+        first = max(int(law.sample(PHI[0] - half_width(sigma)) - 2.0), self._samples.base)
+        mended, gage_flags = inspect(self._samples.strain(first, stop), law.step)
         angle = law.at(np.arange(first, stop))
         strain[:, seen], rate[:, seen] = smooth_to_angle(mended, angle, PHI[seen], sigma)
         gage_flags[without_contact(rate[:, seen])] |= int(TurnFlag.DEAD_GAGE)
         return strain, rate, gage_flags
 
-    def _mean(
-        self, rows: slice, start: float, stop: float, *, robust: bool = False
-    ) -> tuple[FloatArray, BoolArray]:
-        """Mean (or median) of buffer rows between two sample numbers; where too much is missing."""
-        a = max(round(start) - self._base, 0)
-        b = min(round(stop) - self._base, self._filled)
-        part = self._buffer[rows, a:b]
-        good = np.isfinite(part)
-        if good.size and good.all():
-            middle = np.median(part, axis=1) if robust else part.mean(axis=1)
-            return middle, np.zeros(part.shape[0], dtype=np.bool_)
-        count = good.sum(axis=1)
-        gap = count < max((1.0 - LARGEST_MISSING) * part.shape[1], 1.0)
-        middle = np.full(part.shape[0], np.nan)
-        average = np.median if robust else np.mean
-        for row in np.flatnonzero(~gap):
-            middle[row] = average(part[row, good[row]])
-        return middle, gap
-
-    def _in_contact(self, row: int, contact: Contact) -> float:
-        """Return the mean of a buffer row while the gages are in contact, where it acts."""
-        mean, _ = self._mean(slice(row, row + 1), contact.rise, contact.fall + 1.0)
-        return float(mean[0])
-
     def _trigger(self, start: float, stop: float, law: AngleLaw) -> tuple[float, bool]:
         """Wheel angle of the contact's middle from the trigger, and whether it came just once."""
-        a, b = round(start) - self._base, round(stop) - self._base
-        seen = self._buffer[-1, max(a, 0) : b]
-        if seen.size == 0 or np.isnan(seen).any():
+        tops = self._samples.triggers(start, stop)
+        if tops is None:
             return np.nan, True
-        on = np.flatnonzero((seen[1:] > 0.5) & (seen[:-1] <= 0.5)) + 1
-        if on.size != 1:
+        if tops.size != 1:
             return np.nan, False
-        top = (on + max(a, 0) + self._base) - 0.5  # passed between two samples
-        return -np.pi - float(law.at(top)[0]), True
+        return -np.pi - float(law.at(tops)[0]), True
 
 
 def _pulse(contact: Contact, law: AngleLaw) -> float:
