@@ -22,7 +22,8 @@ from bench_recording import READ, pieces, write
 
 from tirebench.deadline import Deadline
 from tirebench.links.opening import PortPlan
-from tirebench.live.chain import LiveChain, LivePlan
+from tirebench.live.chain import LiveChain
+from tirebench.live.live_plan import LivePlan
 from tirebench.live.priority import realtime
 from tirebench.live.reader import ReaderPlan
 from tirebench.protocols import SLCAN

@@ -41,6 +41,7 @@ from tirelib.estimators.train import train
 from tirelib.fleet import engine, work
 from tirelib.fleet.cluster import cluster
 from tirelib.fleet.dataset import DataSet
+from tirelib.fleet.recipes import recipe_of
 from tirelib.fleet.sources import Source, find_sources
 from tirelib.measured.observations import observe
 
@@ -152,7 +153,7 @@ class Peak(Thread):
 def _check(sources: list[Source], out: Path, client: Client) -> engine.Counts:
     data = DataSet(str(out))
     data.open()
-    recipe = engine.recipe_of("check", data, files={})
+    recipe = recipe_of("check", data, files={})
     return engine.run(sources, data, recipe, client, run_verb)
 
 
@@ -226,7 +227,7 @@ def workers(folder: Path, count: int) -> None:
         with cluster(None, number) as client:
             data = DataSet(str(out))
             data.open()
-            recipe = engine.recipe_of("estimate", data, files={"calibration": str(known)})
+            recipe = recipe_of("estimate", data, files={"calibration": str(known)})
             first = ["estimate", str(paths / "000000"), "--calibration", str(known)]
             client.run(run_verb, first)  # every worker has its imports behind it
             before, own, began = _processor(client), _spent(), time.monotonic()
@@ -260,7 +261,7 @@ def endurance(folder: Path, minutes: float) -> None:
 
             data = DataSet(str(out))
             data.open()
-            recipe = engine.recipe_of("check", data, files={})
+            recipe = recipe_of("check", data, files={})
             engine.run(find_sources([str(paths)]), data, recipe, client, run_verb, report=kill)
         found = data.table("container_metrics")["container_id"].to_pylist()
         rounds += 1

@@ -9,7 +9,8 @@ from equations import page as equations
 from sphinx.pycode import ModuleAnalyzer
 
 from tirelib.core.flags import INVALIDATING, TurnFlag
-from tirelib.fmu.variables import Variable, inputs, outputs, parameters
+from tirelib.fmu.strain_variables import inputs, outputs, parameters
+from tirelib.fmu.variables import Variable
 from tirelib.fmu.virtual import table as virtual
 from tirelib.fmu.virtual.spec import friction_surface
 from tirelib.fmu.virtual.surface import shared_surface

@@ -14,7 +14,8 @@ from pythonfmu import Fmi2Slave
 from tirelib.core.held import HELD
 from tirelib.fmu.remarks import strain_remark
 from tirelib.fmu.slave import GuardedSlave
-from tirelib.fmu.variables import MISSING, Variable, inputs, outputs, parameters
+from tirelib.fmu.strain_variables import MISSING, inputs, outputs, parameters
+from tirelib.fmu.variables import Variable
 from tirelib.fmu.wheel import (
     Wheel,
     check_missing,

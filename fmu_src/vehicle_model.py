@@ -11,8 +11,9 @@ import pythonfmu
 from pythonfmu import Fmi2Slave
 
 from tirelib.core.errors import ParameterError
+from tirelib.fmu.guarded import Model
 from tirelib.fmu.refusals import StepError
-from tirelib.fmu.slave import GuardedSlave, Model
+from tirelib.fmu.slave import GuardedSlave
 from tirelib.fmu.variables import Variable
 from tirelib.physics.brush import predict
 

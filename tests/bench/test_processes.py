@@ -29,9 +29,10 @@ from tirebench.estimator.fmu_model import FmuFile, FmuModel
 from tirebench.estimator.wheels import Block, Wheels
 from tirebench.links import BACK, LOST, RESUMED, Read
 from tirebench.links.opening import PortPlan
-from tirebench.live.chain import LiveChain, LivePlan
+from tirebench.live.chain import LiveChain
 from tirebench.live.estimator import EstimatorPlan, Report, _Estimator
 from tirebench.live.exchange import Address, Exchange
+from tirebench.live.live_plan import LivePlan
 from tirebench.live.reader import ReaderPlan, load
 from tirebench.live.recorder import _Recorder
 from tirebench.live.recording_state import Order, RecorderState, RecordingRule

@@ -34,7 +34,8 @@ from tirebench.estimator.session import Session
 from tirebench.estimator.wheels import BusCondition, Line, Wheels
 from tirebench.links import Read
 from tirebench.links.opening import PortPlan
-from tirebench.live.chain import LiveChain, LivePlan
+from tirebench.live.chain import LiveChain
+from tirebench.live.live_plan import LivePlan
 from tirebench.live.reader import ReaderPlan
 from tirebench.protocols import SLCAN
 from tirebench.protocols.decoder import SerialDecoder

@@ -15,7 +15,8 @@ from tirebench.cli.stop import STOPS, on_stop, start_in_order
 from tirebench.estimator.fmu_archive import read_fmu
 from tirebench.estimator.trust import remember
 from tirebench.links.opening import PortPlan
-from tirebench.live.chain import LiveChain, LivePlan
+from tirebench.live.chain import LiveChain
+from tirebench.live.live_plan import LivePlan
 from tirebench.live.reader import ReaderPlan
 from tirebench.recording.header import RecordingHeader
 from tirebench.setup.source_plan import SourcePlan

@@ -26,6 +26,7 @@ from tirelib.fleet import dataset, engine, work
 from tirelib.fleet.dataset import DataSet, now
 from tirelib.fleet.engine import Counts
 from tirelib.fleet.page import fleet_document, write_fleet_page
+from tirelib.fleet.recipes import recipe_of
 from tirelib.fleet.sources import Source, content_hash, find_sources
 
 
@@ -35,7 +36,7 @@ def run(
     data = DataSet(str(out))
     data.open()
     files = {k: str(options.pop(k)) for k in ("calibration", "model") if k in options}
-    recipe = engine.recipe_of(task, data, files=files, options=options.pop("also", ()))  # type: ignore[arg-type]
+    recipe = recipe_of(task, data, files=files, options=options.pop("also", ()))  # type: ignore[arg-type]
     sources = find_sources([str(p) for p in paths])
     return engine.run(sources, data, recipe, client, run_verb, **options)  # type: ignore[arg-type]
 
@@ -179,7 +180,7 @@ def test_a_recording_is_refused_as_one_where_only_campaigns_serve(
 def test_a_worker_that_has_not_the_folders_says_so(campaigns: Path, tmp_path: Path) -> None:
     data = DataSet(str(tmp_path / "out"))
     data.open()
-    recipe = engine.recipe_of("check", data, files={})
+    recipe = recipe_of("check", data, files={})
     here = find_sources([str(campaigns / "north")])[0]
     gone, too = (Source(str(tmp_path / name), True) for name in ("gone", "too"))
     causes = []
@@ -276,7 +277,7 @@ def test_a_data_set_that_cannot_serve_is_refused_before_any_work(
     data = DataSet(str(tmp_path / "out"))
     data.open()
     with pytest.raises(FormatError, match=said):
-        engine.recipe_of("estimate", data, files={"calibration": str(tmp_path / "other")})
+        recipe_of("estimate", data, files={"calibration": str(tmp_path / "other")})
     if "/1" not in head:
         with pytest.raises(FormatError, match=said):
             DataSet(str(tmp_path / "other")).open()
@@ -299,7 +300,7 @@ def test_a_wrong_recipe_is_refused(
     data = DataSet(str(tmp_path / "out"))
     data.open()
     with pytest.raises((ParameterError, FormatError), match=said):
-        engine.recipe_of(task, data, files=files)
+        recipe_of(task, data, files=files)
 
 
 @pytest.mark.parametrize("form", ["--effects {}", "--effects={}"])
@@ -312,7 +313,7 @@ def test_a_file_among_the_options_counts_by_its_content(
     seen = []
     for name, text in (("mine.py", "a = 1"), ("mine.py", "a = 2"), ("copy.py", "a = 2")):
         (tmp_path / name).write_text(text)
-        recipe = engine.recipe_of(
+        recipe = recipe_of(
             "diagnose", data, files={"model": "table-6-1"}, options=form.format(name).split()
         )
         assert recipe.options == tuple(form.format(tmp_path / name).split())

@@ -26,6 +26,7 @@ from tirelib.core.errors import FormatError
 from tirelib.fleet import cluster, engine
 from tirelib.fleet.dataset import DataSet
 from tirelib.fleet.engine import Counts, SchedulerLostError
+from tirelib.fleet.recipes import recipe_of
 from tirelib.fleet.sources import find_sources
 
 COUNT = 6
@@ -45,7 +46,7 @@ def many(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(many: Path, out: Path, client: Client, report: object = None) -> Counts:
     data = DataSet(str(out))
     data.open()
-    recipe = engine.recipe_of("check", data, files={})
+    recipe = recipe_of("check", data, files={})
     said = report or (lambda counts: None)
     return engine.run(find_sources([str(many)]), data, recipe, client, run_verb, report=said)  # type: ignore[arg-type]
 

@@ -9,8 +9,9 @@ import pytest
 from click.testing import CliRunner
 
 from tests.fleet.recordings import describe, write_drive
-from tirelib.campaign import recording as module
-from tirelib.campaign.recording import blocks, read_recording
+from tirelib.campaign import blocks as module
+from tirelib.campaign.blocks import blocks
+from tirelib.campaign.recording import read_recording
 from tirelib.cli import program
 from tirelib.core.errors import FormatError
 from tirelib.estimators.calibration_file import read_calibration

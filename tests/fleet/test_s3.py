@@ -21,6 +21,7 @@ from tirelib.cli.fleet import run_verb
 from tirelib.fleet import engine
 from tirelib.fleet.dataset import DataSet
 from tirelib.fleet.page import write_fleet_page
+from tirelib.fleet.recipes import recipe_of
 from tirelib.fleet.sources import find_sources
 
 
@@ -66,7 +67,7 @@ def test_from_bucket_to_bucket(
     data = DataSet(f"{bucket}/out")
     data.open()
     for skipped in (0, 1):
-        recipe = engine.recipe_of("estimate", data, files={"calibration": str(calibration)})
+        recipe = recipe_of("estimate", data, files={"calibration": str(calibration)})
         counts = engine.run(
             find_sources([f"{bucket}/in"]), data, recipe, client, run_verb, delta=True
         )

@@ -12,7 +12,7 @@ from tests.fmu import live
 from tests.fmu.player import held
 from tests.fmu.virtual_host import QUIET, TYPICAL, Host, file
 from tirelib.fmu.run import LoadedFmu
-from tirelib.fmu.variables import outputs
+from tirelib.fmu.strain_variables import outputs
 
 NAMES = [v.name for v in outputs(live.HEADER.gage_lateral)]
 

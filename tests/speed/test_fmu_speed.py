@@ -22,7 +22,8 @@ from pythonfmu import FmuBuilder
 from tests.fmu import live, virtual_host
 from tests.synthetic import record
 from tirelib.fmu.run import LoadedFmu
-from tirelib.fmu.variables import Variable, inputs, outputs
+from tirelib.fmu.strain_variables import inputs, outputs
+from tirelib.fmu.variables import Variable
 
 pytestmark = pytest.mark.speed
 RATE = 1e4

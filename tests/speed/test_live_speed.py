@@ -21,7 +21,8 @@ from tirebench.estimator.fmu_archive import read_fmu
 from tirebench.estimator.fmu_model import FmuFile
 from tirebench.links import BACK, LOST
 from tirebench.links.opening import PortPlan
-from tirebench.live.chain import LiveChain, LivePlan
+from tirebench.live.chain import LiveChain
+from tirebench.live.live_plan import LivePlan
 from tirebench.live.reader import ReaderPlan
 from tirebench.protocols import SERIAL, SLCAN
 from tirebench.protocols.plan import ProtocolPlan

@@ -13,18 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tirelib.campaign.mdf_header import HEADER_END, START_TIME, WHOLE, check_beginning
 from tirelib.core.errors import Fault, FormatError
 
-_MAGIC = b"MDF     "
-_UNFINISHED = b"UnFinMF "
-_WHOLE = (
-    "a complete file is needed",
-    "copy it again from the logger or take the run out of runs.csv",
-)
-_HEADER_END = 168  # identification block 64 bytes, header block 104 bytes
-_START_TIME = 64 + 24 + 6 * 8  # in the header block, after its links: ns since 1970
 _SHOWN = 12
-_BLOCK_HEAD = 24  # of any block: 4 bytes name, 4 spare, 8 length, 8 number of links
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +96,7 @@ def _reading(size: int) -> Iterator[Any]:
                 "",
                 f"truncated or damaged MDF 4 file of {size} bytes (reader: "
                 f"{str(error)[:80] or type(error).__name__})",
-                *_WHOLE,
+                *WHOLE,
             )
         ) from error
 
@@ -122,90 +114,8 @@ def _checked_content(path: Path) -> bytes:
                 "restore it or take its row out of runs.csv",
             )
         ) from None
-    _check_beginning(content)
+    check_beginning(content)
     return content
-
-
-def _check_beginning(content: "bytes | mmap.mmap") -> None:
-    """Refuse what does not begin like a finished MDF 4 file.
-
-    Raises
-    ------
-    FormatError
-        Saying what it is instead.
-    """
-    beginning = content[:8]
-    if beginning == _UNFINISHED:
-        raise FormatError(
-            Fault(
-                "",
-                "the recording was never finished (UnFinMF)",
-                "a finished MDF 4 file is needed",
-                "finish it with the logger's own tool",
-            )
-        )
-    if beginning != _MAGIC:
-        raise FormatError(
-            Fault(
-                "",
-                f"not an MDF file (begins with {beginning!r})",
-                "ASAM MDF 4 is needed",
-                "convert it with `tirelib import`",
-            )
-        )
-    if content[8:9] != b"4":
-        version = content[8:16].decode("ascii", "replace").strip(" \0")
-        raise FormatError(
-            Fault(
-                "",
-                f"MDF version {version or 'unknown'}",
-                "version 4 is needed",
-                "convert it with the logger's own tool",
-            )
-        )
-    if not _has_header(content):
-        raise FormatError(
-            Fault(
-                "",
-                f"truncated or damaged MDF 4 file of {len(content)} bytes (no whole header)",
-                *_WHOLE,
-            )
-        )
-
-
-def _has_header(content: "bytes | mmap.mmap") -> bool:
-    """Return whether the header and the chains of data and channel groups lie within the file.
-
-    The reader would find that out too, but leaves a half-made object behind.
-    """
-    if len(content) < _HEADER_END or content[64:68] != b"##HD":
-        return False
-    first_group, *others = struct.unpack_from("<6Q", content, 64 + _BLOCK_HEAD)
-    if any(address and _links(content, address) is None for address in others):
-        return False
-    to_visit, seen = [first_group], {0}
-    while to_visit:
-        address = to_visit.pop()
-        if address in seen:
-            continue
-        seen.add(address)
-        links = _links(content, address)
-        if links is None:
-            return False
-        # a data group links to the next one and its first channel group, that to the next
-        count = {b"##DG": 2, b"##CG": 1}.get(content[address : address + 4], 0)
-        to_visit += links[:count]
-    return True
-
-
-def _links(content: "bytes | mmap.mmap", address: int) -> list[int] | None:
-    """Return the links of the block at an address, None when it does not lie within the file."""
-    if address + _BLOCK_HEAD > len(content):
-        return None
-    length, count = struct.unpack_from("<2Q", content, address + 8)
-    if address + length > len(content) or _BLOCK_HEAD + 8 * count > length:
-        return None
-    return list(struct.unpack_from(f"<{count}Q", content, address + _BLOCK_HEAD))
 
 
 def _group(mdf: Any, index: int) -> Group:
@@ -234,18 +144,6 @@ def _channel(signal: Any) -> Channel:
     if invalid is not None and samples.dtype.kind in "biuf":
         samples = np.where(np.asarray(invalid, dtype=bool), np.nan, samples)
     return Channel(str(signal.name), str(signal.unit or ""), samples)
-
-
-def started_at(path: Path) -> float | None:
-    """Return when a recording began, [s since 1970-01-01 UTC]; None if the file does not say."""
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(_HEADER_END)
-    except OSError:
-        return None
-    if len(head) < _HEADER_END or not head.startswith(_MAGIC):
-        return None
-    return 1e-9 * float(struct.unpack_from("<Q", head, _START_TIME)[0]) or None
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,11 +188,11 @@ class MdfFile:
                 )
             ) from None
         try:
-            if self._size < _HEADER_END:
-                _check_beginning(self._stream.read())
+            if self._size < HEADER_END:
+                check_beginning(self._stream.read())
             with mmap.mmap(self._stream.fileno(), 0, access=mmap.ACCESS_READ) as content:
-                _check_beginning(content)
-                self.start = 1e-9 * struct.unpack_from("<Q", content, _START_TIME)[0]
+                check_beginning(content)
+                self.start = 1e-9 * struct.unpack_from("<Q", content, START_TIME)[0]
             # a file object, not a path: a file that ends early raises and never a bus error
             with _reading(self._size) as MDF:
                 self._mdf = _mdf(MDF, self._stream)

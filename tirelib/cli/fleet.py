@@ -133,6 +133,7 @@ def fleet(
     from tirelib.fleet.cluster import cluster
     from tirelib.fleet.dataset import DataSet
     from tirelib.fleet.page import write_fleet_page
+    from tirelib.fleet.recipes import recipe_of
     from tirelib.fleet.sources import find_sources
 
     options = _options(task, more)
@@ -142,7 +143,7 @@ def fleet(
     data = DataSet(str(out))
     data.open()
     files = {"calibration": calibration, "model": model}
-    recipe = engine.recipe_of(
+    recipe = recipe_of(
         task,
         data,
         files={name: given for name, given in files.items() if given is not None},

@@ -1,6 +1,5 @@
 """``tirelib next-test``: the run that would tell suspects apart."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,7 @@ from rich.table import Table
 from tirelib.campaign import read_campaign
 from tirelib.cli.common import CAMPAIGN, FILE, Real, output, write_json
 from tirelib.cli.diagnose import diagnosed
+from tirelib.cli.diagnosis_file import belongs, read_diagnosis
 from tirelib.cli.options import (
     effects_option,
     false_alarm_option,
@@ -21,7 +21,7 @@ from tirelib.cli.options import (
     report_option,
 )
 from tirelib.cli.progress import progress_bar, progress_options
-from tirelib.core.errors import FormatError, ParameterError
+from tirelib.core.errors import ParameterError
 from tirelib.journey import explains_forces
 
 if TYPE_CHECKING:
@@ -68,9 +68,6 @@ def range_options(command: Callable[..., None]) -> Callable[..., None]:
             f"--{name.replace('_', '-')}-range", metavar="LOW HIGH", type=Real(), nargs=2, help=text
         )(command)
     return command
-
-
-DIAGNOSIS = "tirelib-diagnosis/1"
 
 
 @click.command("next-test", epilog=_EXAMPLE)
@@ -170,7 +167,7 @@ def next_test(
         )
     model = model_of(file, catalogue)
     effects, strengths = model.of_strain
-    told = _read_diagnosis(diagnosis_file, "strain") if diagnosis_file is not None else None
+    told = read_diagnosis(diagnosis_file, "strain") if diagnosis_file is not None else None
     suspects = None
     if names is not None:
         suspects = given_suspects(
@@ -180,7 +177,7 @@ def next_test(
             in_base=in_base(model.values),
         )
     elif told is not None:
-        _belongs(told, campaign, [e.name for e in effects], diagnosis_file)
+        belongs(told, campaign, [e.name for e in effects], diagnosis_file)
         suspects = suspects_of(told, catalogue)
     with progress_bar("planning") as progress:
         runs = straight_runs(measure_waveforms(campaign, progress=progress))
@@ -239,7 +236,7 @@ def _for_force(
     told: dict[str, Any] | None = None
     with progress_bar("planning") as progress:
         if diagnosis_file is not None:
-            told = _read_diagnosis(diagnosis_file, quantity)
+            told = read_diagnosis(diagnosis_file, quantity)
             quantity = str(told["quantity"])
         elif names is None:
             _, told = diagnosed(campaign, file, catalogue, quantity, false_alarm, progress)
@@ -247,7 +244,7 @@ def _for_force(
         case = force_case(campaign, file, catalogue, quantity)
         has = [effect.name for effect in case.effects]
         if told is not None:
-            _belongs(told, campaign, has, diagnosis_file)
+            belongs(told, campaign, has, diagnosis_file)
             suspects = suspects_of(told, catalogue)
         else:
             given = [name.strip() for name in str(names).split(",")]
@@ -297,56 +294,6 @@ def _si(name: str, given: tuple[float, float] | None) -> "Range | None":
         return None
     low, high = (float(QUANTITIES[name].measured(x)) for x in given)
     return low, high
-
-
-def _read_diagnosis(path: Path, quantity: str | None) -> dict[str, Any]:
-    """Return a diagnosis file.
-
-    Raises
-    ------
-    FormatError
-        If it cannot be read.
-    ParameterError
-        If it is one of another quantity.
-    """
-    try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise FormatError(
-            f"{path}: cannot be read as JSON ({error}); give the file that `tirelib diagnose "
-            "--json` wrote"
-        ) from error
-    kind = told.get("format") if isinstance(told, dict) else None
-    if kind != DIAGNOSIS:
-        raise FormatError(
-            f"{path}: format is {kind!r}; {DIAGNOSIS!r} is needed; give the file that `tirelib "
-            "diagnose --json` wrote"
-        )
-    missing = [key for key in ("verdict", "named", "candidates", "quantity") if key not in told]
-    if missing:
-        raise FormatError(f"{path}: {', '.join(missing)} is missing; diagnose again")
-    if quantity is not None and told["quantity"] != quantity:
-        raise ParameterError(
-            f"{path}: is a diagnosis of {told['quantity']}, and {quantity} is planned; give "
-            f"--quantity {told['quantity']}, or the other diagnosis"
-        )
-    if quantity is None and told["quantity"] == "strain":
-        raise ParameterError(f"{path}: is a diagnosis of strain; give --quantity strain")
-    return dict(told)
-
-
-def _belongs(told: dict[str, Any], campaign: "Campaign", has: list[str], path: Path | None) -> None:
-    """Refuse a diagnosis of another campaign, or of a model with other effects."""
-    if told.get("campaign", campaign.header.name) != campaign.header.name:
-        raise ParameterError(
-            f"{path}: is of the campaign {told['campaign']!r}, and {campaign.header.name!r} is "
-            "planned; give that campaign, or its diagnosis"
-        )
-    if "has" in told and sorted(told["has"]) != sorted(has):
-        raise ParameterError(
-            f"{path}: is of a model with the effects {', '.join(told['has']) or 'none'}, this one "
-            f"has {', '.join(has) or 'none'}; diagnose this model, or give the other"
-        )
 
 
 def _condition(entry: dict[str, Any], axis: "Axis") -> str:

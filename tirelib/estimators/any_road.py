@@ -3,13 +3,24 @@
 The form is that of `tirelib.estimators.sliding`; friction and lateral slip are spread evenly.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.estimators.sliding import CURVE_DOUBT, TINY, SlidingCurve, Told, angle_of, lost_slip
-from tirelib.estimators.unknowns import FRICTION
+from tirelib.estimators.polynomial import Polynomial
+from tirelib.estimators.sliding import (
+    CURVE_DOUBT,
+    FREE,
+    MOMENT_DOUBT,
+    TINY,
+    SlidingCurve,
+    Told,
+    angle_of,
+    lost_slip,
+)
+from tirelib.estimators.unknowns import FRICTION, Road
 
 ROUGHER = 1.15
 """The roughest road has this friction at least, over that of the calibration."""
@@ -107,6 +118,59 @@ def tell(curve: SlidingCurve, seen: Seen, widest: float) -> Told:
     steep = curve.slope_at(used, at[:, None], across, load, along)[:, 0]
     slope = learnt * middle / used[:, 0] + (1.0 - learnt) * steep
     return Told(usual + change, std, change, slope, sliding)
+
+
+def slid(
+    curve: SlidingCurve,
+    road: Road,
+    models: tuple[Polynomial | None, Polynomial | None],
+    values: Mapping[str, FloatArray],
+    force: FloatArray,
+    load: FloatArray,
+    widest: float,
+) -> Told:
+    """Return what is known of a tread that slides more than it was calibrated.
+
+    Parameters
+    ----------
+    curve : SlidingCurve
+    road : Road
+        Friction and tread of the calibration.
+    models : (Polynomial or None, Polynomial or None)
+        Aligning moment and longitudinal force, where they were calibrated.
+    values : mapping of name to array, shape (n,)
+        Regressors.
+    force, load : arrays, shape (n,), [N]
+    widest : float, [rad]
+        Largest slip angle that is looked for.
+    """
+    camber, friction = np.nan_to_num(values["camber"]), road.said(values, "friction")
+    load, slip = np.maximum(load, 1.0), values["slip_ratio"]
+    used = -force / load - curve.camber[0] * camber
+    side = np.where(used < 0.0, -1.0, 1.0)
+    unseen = road.unseen_friction(curve.friction)
+    known = np.isfinite(friction)
+    told: Told | None = None
+    if known.any():
+        told = curve.at(np.abs(used), load, np.where(known, friction, curve.friction), slip)
+    if told is None or not known.all():
+        aligning, drag = models
+        moment, std = np.zeros_like(used), np.full_like(used, np.inf)
+        pull, pull_std = moment, std
+        if aligning is not None:
+            moment, std = aligning.predict(values)
+            moment = (moment - curve.camber[1] * camber) * side
+            free = np.abs(slip) <= FREE  # not where it is unknown
+            doubt = np.hypot(curve.misfit, MOMENT_DOUBT * unseen)
+            std = np.where(free, np.hypot(std, doubt), np.inf)
+        if drag is not None:
+            pull, pull_std = drag.predict(values)
+            pull_std = np.where(np.isfinite(slip), pull_std, np.inf)
+        slip_std = values.get("slip_std", 0.0 * used)
+        seen = Seen(np.abs(used), load, slip, slip_std, moment, std, pull, pull_std, unseen)
+        open_ = tell(curve, seen, widest)
+        told = open_ if told is None else told.where(known, open_)
+    return replace(told, change=side * told.change, sliding=unseen * told.sliding)
 
 
 def _surprise(apart: FloatArray, std: FloatArray) -> FloatArray:

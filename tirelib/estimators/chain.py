@@ -22,24 +22,13 @@ import numpy as np
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.estimators import tilt
 from tirelib.estimators.angle_model import WIDEST, AngleModel
-from tirelib.estimators.any_road import Seen, tell
+from tirelib.estimators.any_road import slid
 from tirelib.estimators.doubt import moved_by
 from tirelib.estimators.estimate import Estimate
-from tirelib.estimators.laws import (
-    RADIUS_DOUBT,
-    RADIUS_SHARE,
-    ConditionLaws,
-)
+from tirelib.estimators.laws import RADIUS_DOUBT, RADIUS_SHARE, ConditionLaws
 from tirelib.estimators.likeness import Likeness
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, all_inside
-from tirelib.estimators.sliding import (
-    FORCE_DOUBT,
-    FREE,
-    LOAD_DOUBT,
-    MOMENT_DOUBT,
-    SlidingCurve,
-    Told,
-)
+from tirelib.estimators.sliding import FORCE_DOUBT, LOAD_DOUBT, SlidingCurve, Told
 from tirelib.estimators.unknowns import BENT, CORNERING, EDGE, FORCE, LAW_DOUBT, Road
 
 STANDS_ON = {"Fz": ("Fz",), "Fy": ("Fy",), "alpha": ("Fz", "Fy"), "kappa": ()}
@@ -271,9 +260,8 @@ class Chain:
         slope = np.abs(model.polynomial.slope(values, "utilisation"))
         told = np.isfinite(angle)
         if slid is not None:
-            flatter = np.sqrt(
-                np.fmax(slid.slope**2 - slope**2, 0.0)
-            )  # than where it was calibrated
+            # than where it was calibrated
+            flatter = np.sqrt(np.fmax(slid.slope**2 - slope**2, 0.0))
             angle, told = angle + slid.change, np.isfinite(slid.std)
             std = np.sqrt(std**2 + slid.std**2 + (np.fmax(model.blur, spread) * flatter) ** 2)
             slope = slid.slope
@@ -303,47 +291,12 @@ class Chain:
         self, values: Mapping[str, FloatArray], force: FloatArray, load: FloatArray
     ) -> Told | None:
         """Return what is known of a tread that slides more than it was calibrated."""
-        curve = self.sliding
-        if curve is None:
+        if self.sliding is None:
             return None
-        camber, friction = np.nan_to_num(values["camber"]), self.road.said(values, "friction")
-        load, slip = np.maximum(load, 1.0), values["slip_ratio"]
-        used = -force / load - curve.camber[0] * camber
-        side = np.where(used < 0.0, -1.0, 1.0)
-        unseen = self.road.unseen_friction(curve.friction)
-        known = np.isfinite(friction)
-        told: Told | None = None
-        if known.any():
-            told = curve.at(np.abs(used), load, np.where(known, friction, curve.friction), slip)
-        if told is None or not known.all():
-            moment, std = np.zeros_like(used), np.full_like(used, np.inf)
-            pull, pull_std = moment, std
-            if self.moment is not None:
-                moment, std = self.moment.predict(values)
-                moment = (moment - curve.camber[1] * camber) * side
-                free = np.abs(slip) <= FREE  # not where it is unknown
-                doubt = np.hypot(curve.misfit, MOMENT_DOUBT * unseen)
-                std = np.where(free, np.hypot(std, doubt), np.inf)
-            if self.drag is not None:
-                pull, pull_std = self.drag.predict(values)
-                pull_std = np.where(np.isfinite(slip), pull_std, np.inf)
-            widest = max(
-                [known.high for known in self.guards["alpha"] if known.name == "alpha"] or [WIDEST]
-            )
-            seen = Seen(
-                np.abs(used),
-                load,
-                slip,
-                values.get("slip_std", 0.0 * used),
-                moment,
-                std,
-                pull,
-                pull_std,
-                unseen,
-            )
-            open_ = tell(curve, seen, widest)
-            told = open_ if told is None else told.where(known, open_)
-        return replace(told, change=side * told.change, sliding=unseen * told.sliding)
+        ends = [known.high for known in self.guards["alpha"] if known.name == "alpha"]
+        models = self.moment, self.drag
+        widest = max(ends or [WIDEST])
+        return slid(self.sliding, self.road, models, values, force, load, widest)
 
     def _tilt(
         self,
@@ -357,26 +310,15 @@ class Chain:
         Both are zero where the model knows the camber, or the camber is a calibrated one.
         """
         camber = values["camber"]
-        nothing = np.zeros_like(camber)
         if any(variable.name == "camber" for variable in model.variables):
-            return nothing, nothing
-        per_camber = tilt.force_per_camber(load)
+            return np.zeros_like(camber), np.zeros_like(camber)
+        left = None
+        if self.likeness is not None and np.isnan(camber).any():
+            known = self._slid(values, force, load)
+            sliding = np.zeros_like(camber) if known is None else known.sliding
+            left = self.likeness.slope_left(values, sliding)
         ends = [guard for guard in self.guards["Fy"] if guard.name == "camber"]
-        away = nothing
-        if ends:
-            away = np.abs(np.nan_to_num(camber - np.clip(camber, ends[0].low, ends[0].high)))
-        unknown = np.isnan(camber)
-        if not unknown.any():
-            return nothing, per_camber * away
-        leaning, std = nothing, np.full_like(camber, tilt.USUAL)
-        if self.likeness is not None:
-            slid = self._slid(values, force, load)
-            sliding = nothing if slid is None else slid.sliding
-            leaning, std = tilt.read(*self.likeness.slope_left(values, sliding))
-        std = np.hypot(std, tilt.READ_DOUBT * leaning)
-        return np.where(unknown, per_camber * leaning, 0.0), per_camber * np.where(
-            unknown, std, away
-        )
+        return tilt.part_of_force(camber, load, (ends[0].low, ends[0].high) if ends else None, left)
 
     def _rolling_radius(
         self,

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.campaign.recording import Block, Recording, Wheel, blocks
+from tirelib.campaign.blocks import Block, blocks
+from tirelib.campaign.recording import Recording, Wheel
 from tirelib.core.arrays import FloatArray
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.estimate import Estimates
@@ -64,7 +65,7 @@ def estimate_recording(recording: Recording, calibration: Calibration) -> Iterat
     CalibrationError
         If a wheel has another tire or other gages.
     FormatError
-        As from `tirelib.campaign.recording.blocks`.
+        As from `tirelib.campaign.blocks.blocks`.
     """
     for wheel in recording.wheels:
         calibration.check_layout(wheel.tire, wheel.lateral, f"{recording.path}, {wheel.name}")

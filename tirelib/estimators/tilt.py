@@ -36,6 +36,37 @@ def force_per_camber(load: FloatArray) -> FloatArray:
     return np.asarray(FORCE * (np.maximum(load, LEAST_LOAD) / LOAD) ** POWER)
 
 
+def part_of_force(
+    camber: FloatArray,
+    load: FloatArray,
+    ends: tuple[float, float] | None,
+    left: tuple[FloatArray, FloatArray] | None,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the part of Fy that is a camber's and its standard deviation, [N].
+
+    Both are zero where the camber is a calibrated one.
+
+    Parameters
+    ----------
+    camber, load : arrays, shape (n,), [rad], [N]
+        NaN: a camber that nobody gives.
+    ends : (low, high), [rad], or None
+        Cambers of the calibration.
+    left : (rest, noise) or None
+        For `read`.
+    """
+    per_camber, nothing = force_per_camber(load), np.zeros_like(camber)
+    away = nothing
+    if ends is not None:
+        away = np.abs(np.nan_to_num(camber - np.clip(camber, *ends)))
+    unknown = np.isnan(camber)
+    if not unknown.any():
+        return nothing, per_camber * away
+    leaning, std = (nothing, np.full_like(camber, USUAL)) if left is None else read(*left)
+    std = np.hypot(std, READ_DOUBT * leaning)
+    return np.where(unknown, per_camber * leaning, 0.0), per_camber * np.where(unknown, std, away)
+
+
 def read(rest: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the camber and its standard deviation, [rad], each of shape (n,).
 

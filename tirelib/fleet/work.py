@@ -20,7 +20,7 @@ from pathlib import Path
 from threading import Lock
 
 from tirelib.campaign.header import parse_header
-from tirelib.campaign.mdf import started_at
+from tirelib.campaign.mdf_header import started_at
 from tirelib.campaign.plan import parse_plans
 from tirelib.campaign.problem import Problem, errors_of
 from tirelib.campaign.recording import FILE as RECORDING

@@ -10,61 +10,18 @@ and gives `table`, `started` and `advance`. This module knows pythonfmu only thr
 it can be checked and used where pythonfmu is not installed.
 """
 
-import ctypes
-import functools
 import hashlib
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, NoReturn, Protocol
+from typing import Any, ClassVar, NoReturn
 
 from tirelib.core.errors import FormatError, ParameterError, TirelibError
+from tirelib.fmu.guarded import Model, cause_of, guarded
 from tirelib.fmu.journal import Journal
 from tirelib.fmu.refusals import STEP_REFUSED, StepError, status_entry
 from tirelib.fmu.variables import Variable
-
-
-class Model(Protocol):
-    """The model that a slave steps; it supplies its output values and its state."""
-
-    def outputs(self) -> tuple[Sequence[float], Sequence[Any]]:
-        """Return the values of the Real outputs and of the others, in the table's order."""
-
-    def fault(self, cause: str) -> None:
-        """Hold the last values as invalid and start again, after an error."""
-
-    def state(self) -> dict[str, Any]:
-        """Return everything that is remembered, as JSON knows it."""
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Take up a state."""
-
-
-def guarded(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Let an error reach the importer as an FMI error, with its cause in the log.
-
-    On every exception pythonfmu 0.7.0 gives up a reference to the class, to the instance and to its
-    log, and goes on using them: a reset or a free that followed would touch freed memory. Each gets
-    one more reference here, so that the importer lives.
-    """
-
-    @functools.wraps(method)
-    def call(self: Any, *args: Any) -> Any:
-        try:
-            return method(self, *args)
-        except Exception as error:
-            self.complain(str(error) if isinstance(error, StepError) else _cause(error))
-            for kept in (type(self), self, self.log_queue):
-                ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))
-            raise
-
-    return call
-
-
-def _cause(error: Exception) -> str:
-    text = str(error)
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 class GuardedSlave:
@@ -307,7 +264,7 @@ class GuardedSlave:
         except StepError as error:
             self._refuse(str(error))
         except Exception as error:  # nothing may reach the importer
-            cause = _cause(error)
+            cause = cause_of(error)
             self.complain(cause)
             self.model.fault(cause)
             changed = True

@@ -19,7 +19,7 @@ from tirelib.core.held import HELD
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.reference_turn import ReferenceTurn
 from tirelib.fmu.reference import Reference, contact_strain
-from tirelib.fmu.variables import inputs, outputs
+from tirelib.fmu.strain_variables import inputs, outputs
 from tirelib.fmu.wheel import Wheel
 from tirelib.stream.reference import NumpyEstimator
 

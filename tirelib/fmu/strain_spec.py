@@ -16,7 +16,8 @@ from tirelib.fmu.reference import FOLDER
 from tirelib.fmu.remarks import lines
 from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.strain_reference import strain_reference
-from tirelib.fmu.variables import MISSING, Variable, inputs, outputs, parameters
+from tirelib.fmu.strain_variables import MISSING, inputs, outputs, parameters
+from tirelib.fmu.variables import Variable
 from tirelib.fmu.wheel import check_missing
 from tirelib.stream.estimator import RATES
 

@@ -6,13 +6,16 @@ effects are in no catalogue. At strength zero the rig is what it is without.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from tirelib.core.errors import ParameterError
 from tirelib.rig import shown
+from tirelib.rig.hidden_effect import MICROSTRAIN, SQUARE_MM, Hidden, Stated
 from tirelib.rig.laws import (
     LossModulus,
     RearSliding,
@@ -22,106 +25,7 @@ from tirelib.rig.laws import (
     StorageModulus,
     WaterWedge,
 )
-from tirelib.rig.observe import Trace
-from tirelib.rig.shown import Shown, ShownLaw
 from tirelib.rig.tire import Condition, RigTire
-
-TireLaw = Callable[[RigTire, Condition, float, float], RigTire]
-"""(tire, condition, place in the campaign from 0 to 1, strength) -> tire of that run."""
-
-
-@dataclass(frozen=True)
-class Stated:
-    """The unit in which the library's catalogue has an effect: factor x strength^power.
-
-    The mean over a length and the spread of a height come into the catalogue as squares.
-    """
-
-    unit: str
-    factor: float
-    power: int = 1
-
-
-MICROSTRAIN = Stated("ustrain", 1e6)
-SQUARE_MM = Stated("mm^2", 1e6, 2)
-
-
-@dataclass(frozen=True)
-class Hidden:
-    """An effect that the rig can hide.
-
-    Attributes
-    ----------
-    name : str
-        As verdicts would name it, or its own name where no catalogue has it.
-    law : str
-        In words.
-    visible, largest : float
-        A strength that shows clearly, and the largest that makes sense; in the law's unit.
-    unit : str
-        Unit of the law, SI.
-    known : bool
-        Whether the library's catalogue has an effect of this name.
-    signed : bool
-        Whether either sign makes sense.
-    on_tire, on_trace
-        What it changes: the tire of a run, or what the gages show of the solved state.
-    stated : Stated or None
-        How a user states a strength, where that is not the law's unit.
-    """
-
-    name: str
-    law: str
-    visible: float
-    largest: float
-    unit: str
-    known: bool = True
-    signed: bool = False
-    on_tire: TireLaw | None = None
-    on_trace: ShownLaw | None = None
-    stated: Stated | None = None
-
-    @property
-    def stated_unit(self) -> str:
-        """Return the unit in which a user states a strength."""
-        return self.unit if self.stated is None else self.stated.unit
-
-    def as_stated(self, strength: float) -> float:
-        """Return a strength of the law as a user states it."""
-        if self.stated is None:
-            return strength
-        return float(f"{self.stated.factor * strength**self.stated.power:.12g}")
-
-    def from_stated(self, number: float) -> float:
-        """Return the law's strength for what a user states.
-
-        Raises
-        ------
-        ParameterError
-            If it is another sign or size than makes sense; zero is allowed.
-        """
-        low, high = (self.as_stated(s) for s in (0.01 * self.visible, self.largest))
-        if number != 0.0 and not (low <= (abs(number) if self.signed else number) <= high):
-            sides = ", of either sign" if self.signed else ""
-            raise ParameterError(
-                f"{self.name}={number:g}: strengths from {low:g} to {high:g} {self.stated_unit}"
-                f"{sides} are allowed; {self.as_stated(self.visible):g} shows clearly"
-            )
-        if self.stated is None:
-            return number
-        return float((number / self.stated.factor) ** (1.0 / self.stated.power))
-
-    def tire(self, tire: RigTire, cond: Condition, place: float, strength: float) -> RigTire:
-        """Return the tire as it is in a run."""
-        if self.on_tire is None or strength == 0.0:
-            return tire
-        return self.on_tire(tire, cond, place, strength)
-
-    def trace(self, seen: Shown, strength: float) -> Trace:
-        """Return what the gages show."""
-        if self.on_trace is None or strength == 0.0:
-            return seen.trace
-        return self.on_trace(seen, strength)
 
 
 def _sidewall(tire: RigTire, radial: float, tangential: float) -> RigTire:
@@ -134,8 +38,16 @@ def _sidewall(tire: RigTire, radial: float, tangential: float) -> RigTire:
     )
 
 
-def _softer_where_pressed(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
-    return replace(tire, sidewall_softening=s)
+def _set(tire: RigTire, cond: Condition, place: float, s: float, *, name: str) -> RigTire:
+    changed: dict[str, Any] = {name: s}
+    return replace(tire, **changed)
+
+
+def _law(
+    tire: RigTire, cond: Condition, place: float, s: float, *, of: str, law: Callable[[float], Any]
+) -> RigTire:
+    more: dict[str, Any] = {of: (*getattr(tire, of), law(s))}
+    return replace(tire, **more)
 
 
 def _buckled_when_slack(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
@@ -143,21 +55,9 @@ def _buckled_when_slack(tire: RigTire, cond: Condition, place: float, s: float) 
     return _sidewall(tire, 1.0 - s * slack, 1.0 - 0.3 * s * slack)
 
 
-def _loss(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
-    return replace(tire, belt_laws=(*tire.belt_laws, LossModulus(s)))
-
-
 def _warm(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
     soft = 1.0 / (1.0 + s * float(1.0 - np.exp(-3.0 * place)))
     return replace(_sidewall(tire, soft, soft), tread_normal=tire.tread_normal * soft**0.8)
-
-
-def _flung(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
-    return replace(tire, belt_laws=(*tire.belt_laws, SidewallPull(s)))
-
-
-def _turned(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
-    return replace(tire, belt_laws=(*tire.belt_laws, SectionInertia(s)))
 
 
 def _shear(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
@@ -168,10 +68,6 @@ def _storage(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
     faster = (cond.speed / 20.0) ** (0.8 * s)
     law = StorageModulus(s)
     return replace(tire, belt_laws=(*tire.belt_laws, law), tread_normal=tire.tread_normal * faster)
-
-
-def _grip(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
-    return replace(tire, road_laws=(*tire.road_laws, RegularCoulomb(s)))
 
 
 def _grooves(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
@@ -188,26 +84,6 @@ def _worn(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
     )
 
 
-def _slides(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
-    return replace(tire, road_laws=(*tire.road_laws, RearSliding(s)))
-
-
-def _wet(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
-    return replace(tire, road_laws=(*tire.road_laws, WaterWedge(s)))
-
-
-def _rough(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
-    return replace(tire, tread_roughness=s)
-
-
-def _cubic(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
-    return replace(tire, tread_cubic=s)
-
-
-def _drum(tire: RigTire, cond: Condition, place: float, s: float) -> RigTire:
-    return replace(tire, road_curvature=s)
-
-
 _EFFECTS = (
     # in the catalogue
     Hidden(
@@ -216,7 +92,7 @@ _EFFECTS = (
         0.3,
         0.9,
         "1",
-        on_tire=_softer_where_pressed,
+        on_tire=partial(_set, name="sidewall_softening"),
     ),
     Hidden(
         "sidewall_pressure",
@@ -233,7 +109,7 @@ _EFFECTS = (
         0.15,
         0.8,
         "1",
-        on_tire=_loss,
+        on_tire=partial(_law, of="belt_laws", law=LossModulus),
     ),
     Hidden(
         "temperature",
@@ -249,7 +125,7 @@ _EFFECTS = (
         0.5,
         2.5,
         "1",
-        on_tire=_flung,
+        on_tire=partial(_law, of="belt_laws", law=SidewallPull),
     ),
     Hidden(
         "rotary_inertia",
@@ -257,7 +133,7 @@ _EFFECTS = (
         1.5e-4,
         2e-4,
         "kg m",
-        on_tire=_turned,
+        on_tire=partial(_law, of="belt_laws", law=SectionInertia),
     ),
     Hidden(
         "belt_shear",
@@ -282,7 +158,7 @@ _EFFECTS = (
         0.05,
         0.9,
         "1",
-        on_tire=_grip,
+        on_tire=partial(_law, of="road_laws", law=RegularCoulomb),
     ),
     Hidden(
         "tread_load",
@@ -307,10 +183,15 @@ _EFFECTS = (
         0.1,
         0.8,
         "1",
-        on_tire=_slides,
+        on_tire=partial(_law, of="road_laws", law=RearSliding),
     ),
     Hidden(
-        "hydroplaning", "wedge of water 30 mm ahead of the contact", 0.15, 0.6, "1", on_tire=_wet
+        "hydroplaning",
+        "wedge of water 30 mm ahead of the contact",
+        0.15,
+        0.6,
+        "1",
+        on_tire=partial(_law, of="road_laws", law=WaterWedge),
     ),
     Hidden(
         "roughness",
@@ -318,7 +199,7 @@ _EFFECTS = (
         4e-4,
         4e-3,
         "m",
-        on_tire=_rough,
+        on_tire=partial(_set, name="tread_roughness"),
         stated=SQUARE_MM,
     ),
     Hidden(
@@ -454,9 +335,17 @@ _EFFECTS = (
         1500.0,
         "1",
         False,
-        on_tire=_cubic,
+        on_tire=partial(_set, name="tread_cubic"),
     ),
-    Hidden("drum_road", "road of a drum", 0.5, 4.0, "1/m", False, on_tire=_drum),
+    Hidden(
+        "drum_road",
+        "road of a drum",
+        0.5,
+        4.0,
+        "1/m",
+        False,
+        on_tire=partial(_set, name="road_curvature"),
+    ),
 )
 
 HIDDEN: Mapping[str, Hidden] = MappingProxyType({effect.name: effect for effect in _EFFECTS})

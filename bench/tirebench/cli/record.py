@@ -21,7 +21,8 @@ from tirebench.cli.stop import start_in_order
 from tirebench.estimator.estimation import News
 from tirebench.estimator.session import Limits, Session
 from tirebench.links.opening import PortPlan
-from tirebench.live.chain import LiveChain, LivePlan
+from tirebench.live.chain import LiveChain
+from tirebench.live.live_plan import LivePlan
 from tirebench.live.priority import ordinary, realtime
 from tirebench.live.reader import ReaderPlan
 from tirebench.live.recording_state import RecordingRule

@@ -5,8 +5,6 @@ import json
 import pickle
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -16,21 +14,20 @@ from tirebench.errors import LinkTimeoutError, RecordingError
 from tirebench.estimator.chain import Jump
 from tirebench.estimator.checked_turns import CheckedTurns
 from tirebench.estimator.estimation import News, skipped
-from tirebench.estimator.fmu_model import FmuFile
 from tirebench.estimator.wheels import MOST_WHEELS, Wheels
 from tirebench.live.board import SIZE
 from tirebench.live.estimators import Estimators
 from tirebench.live.exchange import FINISH, STOP, Exchange, woken
+from tirebench.live.live_plan import LivePlan
 from tirebench.live.ports import PortState, read_source
-from tirebench.live.reader import LineState, ReaderPlan, load, read_port
+from tirebench.live.reader import LineState, load, read_port
 from tirebench.live.recorder import record
-from tirebench.live.recording_state import Order, RecorderState, RecordingRule
+from tirebench.live.recording_state import Order, RecorderState
 from tirebench.live.run_alarms import TOO_BUSY, RunAlarms
 from tirebench.live.supervised import CONTEXT, Supervised
 from tirebench.recording.document import turn_document
-from tirebench.recording.header import RecordingHeader, part_path
+from tirebench.recording.header import part_path
 from tirebench.recording.recorder import jump_event
-from tirebench.wire.conditions import Conditions
 
 START_TIME_LIMIT = 300.0
 """Processes that are not ready after so long do not start, even on a busy machine, [s]."""
@@ -43,34 +40,6 @@ END_TIME_LIMIT = 60.0
 LEAVE, AT_ONCE = 60.0, 5.0
 """Time that a process may take to end on request before it is killed, [s]: one that still has
 something to save, and one that has not."""
-
-
-@dataclass(frozen=True, slots=True)
-class LivePlan:
-    """What runs.
-
-    Attributes
-    ----------
-    reader : ReaderPlan
-    file : FmuFile or None
-        None: nothing is estimated.
-    conditions : Conditions
-    header : RecordingHeader
-        Header of every recording.
-    record : Path or None
-        File of the recording that begins with the run.
-    laps : bool
-        Whether anybody looks at laps.
-    rule : RecordingRule
-    """
-
-    reader: ReaderPlan
-    file: FmuFile | None
-    conditions: Conditions
-    header: RecordingHeader
-    record: Path | None = None
-    laps: bool = True
-    rule: RecordingRule = field(default_factory=RecordingRule)
 
 
 class LiveChain:
@@ -321,14 +290,8 @@ class LiveChain:
         return {name: kept for name, kept in named.items() if kept is not None}
 
     def _start_port(self, number: int) -> None:
-        reader = self._plan.reader
-        plan = (
-            number,
-            reader.sources[number].port,
-            reader.patience,
-            reader.wait,
-            self._exchange.address,
-        )
+        reader, address = self._plan.reader, self._exchange.address
+        plan = (number, reader.sources[number].port, reader.patience, reader.wait, address)
         self._ports.append(Supervised(read_source, lambda _: plan))
 
     def _opening(self) -> str:

@@ -56,7 +56,7 @@ from typing import Any
 from tirebench.errors import DeviceError, cause
 from tirebench.protocols.map_messages import Message, kind_of, listed, of_dbc
 from tirebench.protocols.map_parts import CarriedQuantity, UserMap, WheelMap, clashes
-from tirebench.protocols.signals import Signal
+from tirebench.protocols.map_reader import MapReader, is_wheel
 from tirebench.wire.conditions import HOLD, TELLABLE
 from tirebench.wire.device import Device
 from tirebench.wire.frames import MOST_GAGES
@@ -64,7 +64,6 @@ from tirelib.core.errors import TirelibError
 from tirelib.core.units import to_si
 
 FORMAT = "tirebench-map/1"
-LONGEST_SIGNAL = 32
 SHORTEST_WRAP = 0.1
 """A counter that wraps sooner needs a time beside it, or a gap could not be seen, [s]."""
 _WANTED = (
@@ -116,25 +115,12 @@ def parse_map(text: str, dbc: str, where: str) -> UserMap:
     return _Reader(document, where).read(text if not dbc else f"{text}\0{dbc}", dbc)
 
 
-class _Reader:
-    """Collects every fault of a map before it raises."""
+class _Reader(MapReader):
+    """Reads a map."""
 
     def __init__(self, document: dict[str, Any], where: str) -> None:
-        self.document = document
-        self.where = where
-        self.faults: list[str] = []
-        self._known_keys("", document, _KEYS)
-
-    def _known_keys(self, what: str, table: Mapping[str, Any], known: set[str]) -> None:
-        """Note each key that a table cannot have: a misspelt one would be left out silently."""
-        self.faults += [
-            f"{self.where}: {what}unknown key {key}; allowed keys are {', '.join(sorted(known))}; "
-            "correct it"
-            for key in sorted(set(table) - known)
-        ]
-
-    def fault(self, what: str, given: object, allowed: str, remedy: str = "correct it") -> None:
-        self.faults.append(f"{self.where}: {what} = {given!r}; {allowed}; {remedy}")
+        super().__init__(document, where)
+        self.known_keys("", document, _KEYS)
 
     def read(self, text: str, dbc: str) -> UserMap:
         messages = self._of_dbc(dbc) if dbc else self._of_tables()
@@ -213,8 +199,8 @@ class _Reader:
     ) -> WheelMap | None:
         before = len(self.faults)
         what = f"wheel {table.get('wheel')!r}"
-        self._known_keys(f"{what}: ", table, _WHEEL_KEYS)
-        message = self._message(f"{what}: message", table.get("message"), messages)
+        self.known_keys(f"{what}: ", table, _WHEEL_KEYS)
+        message = self.message(f"{what}: message", table.get("message"), messages)
         rows = table.get("samples", [])
         if (
             not isinstance(rows, list)
@@ -231,7 +217,7 @@ class _Reader:
         if message is None:
             return None
         names = [name for row in rows for name in row if name != ""]
-        strain = [self._signal(what, name, message) for name in names]
+        strain = [self.signal(what, name, message) for name in names]
         absent = tuple(name == "" for name in rows[0])
         if any(tuple(name == "" for name in row) != absent for row in rows) or all(absent):
             self.fault(
@@ -239,12 +225,12 @@ class _Reader:
                 rows,
                 'each sample needs the same gages, at least one; "" stands for a missing gage',
             )
-        counter = self._optional(what, table, "counter", message)
-        time = self._optional(what, table, "time", message)
+        counter = self.optional(what, table, "counter", message)
+        time = self.optional(what, table, "time", message)
         tick = 1.0
         if time is not None:
-            tick = self._seconds(what, table.get("time_unit"), time)
-            self._integer(what, time)
+            tick = self.seconds(what, table.get("time_unit"), time)
+            self.integer(what, time)
         elif counter is None:
             self.fault(
                 what,
@@ -262,7 +248,7 @@ class _Reader:
                 "name a time signal too",
             )
         if counter is not None:
-            self._integer(what, counter)
+            self.integer(what, counter)
         used = [s for s in (*strain, counter, time) if s is not None]
         if len({(s.selector, s.selected) for s in used}) > 1:
             self.fault(
@@ -272,69 +258,12 @@ class _Reader:
                 "the same multiplexer with the same value",
             )
         number = table.get("wheel")
-        if not _is_wheel(number):
+        if not is_wheel(number):
             self.fault("wheel", number, "0 .. 255 is needed")
         if len(self.faults) > before:
             return None
         known = tuple(signal for signal in strain if signal is not None)
         return WheelMap(int(number or 0), message, known, counter, time, tick, absent)
-
-    def _message(self, what: str, name: Any, messages: Mapping[str, Message]) -> Message | None:
-        message = messages.get(str(name))
-        if message is None:
-            self.fault(
-                what, name, f"the known messages are {', '.join(sorted(messages)) or 'none'}"
-            )
-        return message
-
-    def _signal(self, what: str, name: Any, message: Message) -> Signal | None:
-        signal = message.signals.get(str(name))
-        if signal is None:
-            self.fault(
-                f"{what}: signal",
-                name,
-                f"{message.name} has the signals {', '.join(message.signals) or 'none'}",
-            )
-            return None
-        for part in (signal, signal.selector):
-            if part is not None and not _fits(part, message):
-                self.fault(
-                    f"{what}: signal",
-                    part.name,
-                    f"a signal must lie inside the {message.length} bytes of {message.name} and "
-                    f"have 1 to {LONGEST_SIGNAL} bits, or 32 or 64 bits if it is a float",
-                )
-                return None
-        if signal.selector is not None and signal.selector.selector is not None:
-            self.fault(
-                f"{what}: signal",
-                name,
-                "a multiplexer that is itself multiplexed is not supported",
-                "name another",
-            )
-            return None
-        return signal
-
-    def _integer(self, what: str, signal: Signal) -> None:
-        if signal.real:
-            self.fault(
-                f"{what}: signal",
-                signal.name,
-                "counter and time must be integers, because a float does not show where it wraps",
-                "name another signal, or give the column's bits",
-            )
-
-    def _optional(
-        self, what: str, table: dict[str, Any], key: str, message: Message
-    ) -> Signal | None:
-        return self._signal(what, table[key], message) if key in table else None
-
-    def _seconds(self, what: str, unit: Any, time: Signal) -> float:
-        try:
-            return time.factor * float(to_si(1.0, str(unit), "time"))
-        except TirelibError as error:
-            self.fault(f"{what}: time_unit", unit, f"a unit of time is needed ({error})")
-            return 1.0
 
     def _device(self, wheels: list[WheelMap]) -> Device:
         """Scale, zero and ends of the range, from the signals."""
@@ -379,11 +308,11 @@ class _Reader:
     def _quantity(
         self, name: str, table: dict[str, Any], messages: Mapping[str, Message]
     ) -> CarriedQuantity | None:
-        self._known_keys(f"{name}: ", table, _CONDITION_KEYS)
-        message = self._message(f"{name}: message", table.get("message"), messages)
+        self.known_keys(f"{name}: ", table, _CONDITION_KEYS)
+        message = self.message(f"{name}: message", table.get("message"), messages)
         if message is None:
             return None
-        signal = self._signal(name, table.get("signal"), message)
+        signal = self.signal(name, table.get("signal"), message)
         hold = table.get("hold_s", HOLD.get(TELLABLE[name][0], math.inf))
         if not isinstance(hold, int | float) or isinstance(hold, bool) or not hold > 0.0:
             self.fault(f"{name}: hold_s", hold, "a time above 0 s is needed")
@@ -393,24 +322,13 @@ class _Reader:
             to_si(1.0, unit, dimension)
         except TirelibError as error:
             self.fault(f"{name}: unit", unit, f"a unit of {dimension} is needed ({error})")
-        if wheel is not None and not _is_wheel(wheel):
+        if wheel is not None and not is_wheel(wheel):
             self.fault(
                 f"{name}: wheel",
                 wheel,
                 "0 .. 255 is needed; leave it out if the value holds for all wheels",
             )
         return None if signal is None else CarriedQuantity(name, message, signal, unit, wheel, hold)
-
-
-def _is_wheel(number: object) -> bool:
-    return isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= 255
-
-
-def _fits(signal: Signal, message: Message) -> bool:
-    """Whether a signal has a length that can be read and lies inside its message."""
-    places = signal.places
-    good = signal.length in (32, 64) if signal.real else 1 <= signal.length <= LONGEST_SIGNAL
-    return good and int(places.min()) >= 0 and int(places.max()) < 8 * message.length
 
 
 def _why(error: Exception) -> str:

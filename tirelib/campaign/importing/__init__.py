@@ -8,8 +8,9 @@ from tirelib.campaign.importing.columns import Column, Table
 from tirelib.campaign.importing.delimited import CsvOptions
 from tirelib.campaign.importing.formats import read_table
 from tirelib.campaign.importing.importer import ImportReport, import_campaign
-from tirelib.campaign.importing.mapfile import ImportMap, read_map
+from tirelib.campaign.importing.mapfile import read_map
 from tirelib.campaign.importing.plans import ImportedRun
+from tirelib.campaign.importing.rules import ImportMap
 from tirelib.campaign.importing.suggest import ColumnSummary, list_columns, suggest_map
 from tirelib.campaign.importing.tydex import (
     TydexChannel,

@@ -20,13 +20,14 @@ from tirelib.campaign.finding import RunFinding, gathered
 from tirelib.campaign.importing.convert import Piece, clocks_of, convert
 from tirelib.campaign.importing.defects import mended
 from tirelib.campaign.importing.formats import read_table
-from tirelib.campaign.importing.mapfile import ImportMap, parse_map
+from tirelib.campaign.importing.mapfile import parse_map
 from tirelib.campaign.importing.plans import (
     ImportedRun,
     imported_run,
     plan_problems,
     with_starts,
 )
+from tirelib.campaign.importing.rules import ImportMap
 from tirelib.campaign.importing.unmapped import Unmapped
 from tirelib.campaign.model import CampaignHeader, Run, RunPlan
 from tirelib.campaign.problem import Problem, errors_of

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from tirelib.campaign.importing.convert import Piece
-from tirelib.campaign.importing.mapfile import ImportMap
+from tirelib.campaign.importing.rules import ImportMap
 from tirelib.campaign.model import RunPlan
 from tirelib.campaign.plan import SET_POINTS
 from tirelib.campaign.problem import Problem

@@ -7,7 +7,7 @@ import numpy as np
 from tirelib.campaign.check_order import FOLLOWS, force_sign_of, moment_sign_of, signs_of
 from tirelib.campaign.check_rig import shown
 from tirelib.campaign.finding import RunFinding
-from tirelib.campaign.importing.mapfile import ImportMap
+from tirelib.campaign.importing.rules import ImportMap
 from tirelib.campaign.model import FloatArray, Run, RunPlan
 from tirelib.campaign.problem import Problem
 

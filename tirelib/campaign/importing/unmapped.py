@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tirelib.campaign.importing.columns import Table
-from tirelib.campaign.importing.mapfile import ImportMap, SetPointRule
+from tirelib.campaign.importing.rules import ImportMap, SetPointRule
 from tirelib.campaign.importing.suggest import SET_POINTS, quantity_of
 from tirelib.campaign.problem import Problem
 

@@ -108,7 +108,8 @@ class Samples:
         seen = self._values[-1, first - self.base : round(stop) - self.base]
         if seen.size == 0 or np.isnan(seen).any():
             return None
-        return np.flatnonzero((seen[1:] > 0.5) & (seen[:-1] <= 0.5)) + (first + 0.5)
+        on = np.flatnonzero((seen[1:] > 0.5) & (seen[:-1] <= 0.5))
+        return np.asarray(on + (first + 0.5), dtype=np.float64)
 
     def _mean(
         self, rows: slice, start: float, stop: float, *, robust: bool = False

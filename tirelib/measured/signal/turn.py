@@ -92,13 +92,11 @@ class Turns:
 
 def unknown_turn(time: float, ready: float, gages: int, flags: TurnFlag) -> Turn:
     """Return the turn of a contact without a preceding turn: its values are unknown."""
-    values = {field.name: np.nan for field in fields(Turn)}
-    rows = dict.fromkeys(("offset", "offset_std", "mean"), np.full(gages, np.nan))
-    curves = dict.fromkeys(("strain", "rate"), np.full((gages, PHI.size), np.nan))
-    known = {"time": time, "ready": ready, "flags": int(flags)}
-    return Turn(
-        **{**values, **rows, **curves, **known, "gage_flags": np.zeros(gages, dtype=np.int64)}
-    )
+    values: dict[str, Any] = {field.name: np.nan for field in fields(Turn)}
+    values |= dict.fromkeys(("offset", "offset_std", "mean"), np.full(gages, np.nan))
+    values |= dict.fromkeys(("strain", "rate"), np.full((gages, PHI.size), np.nan))
+    values |= {"gage_flags": np.zeros(gages, dtype=np.int64), "flags": int(flags)}
+    return Turn(**{**values, "time": time, "ready": ready})
 
 
 def stack_turns(turns: Sequence[Turn], lateral: FloatArray, rate: float) -> Turns:

@@ -8,23 +8,16 @@ load and the wheel's torque.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.physics.rolling import belt, road
+from tirelib.physics.rolling.band import BORDER, WIDTH, Matrix, banded, gathered
 from tirelib.physics.rolling.constants import Constants
 from tirelib.physics.rolling.mesh import Mesh, Points
 
-WIDTH = 4
-"""Unknowns of a node."""
-LOCAL = 16
-"""Unknowns of an element."""
-BORDER = WIDTH + 2
-BAND = LOCAL - 1
-"""Diagonals on either side."""
 Q = 3
 ROAD = tuple(name for name in Constants.__slots__ if name == "radius" or name not in belt.CONSTANTS)
 """Constants that the contact is made of."""
@@ -228,32 +221,6 @@ def _of_road(x: Unknowns, c: Contact, k: Constants, mesh: Mesh) -> _Road:
     return _Road(out, load, torque)
 
 
-def gathered(local: FloatArray) -> FloatArray:
-    """Return nodal sums (n_points, n_nodes, ...) of values (n_points, n_elements, 4, ...)."""
-    n_points, n_elements = local.shape[:2]
-    out = local[:, :, :3].copy()
-    out[:, :, 0] += np.roll(local[:, :, 3], 1, axis=1)
-    return out.reshape(n_points, 3 * n_elements, *local.shape[3:])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Matrix:
-    """The derivative of the residual: a band with a border.
-
-    Attributes
-    ----------
-    band : shape (n_points, n_inner, 3 BAND + 1)
-        LAPACK's band storage, transposed; unknowns of all nodes but the first.
-    right, lower : shape (n_points, n_inner, BORDER), (n_points, BORDER, n_inner)
-    corner : shape (n_points, BORDER, BORDER)
-    """
-
-    band: FloatArray
-    right: FloatArray
-    lower: FloatArray
-    corner: FloatArray
-
-
 def matrix(x: Unknowns, z: FloatArray, c: Contact, k: Constants, mesh: Mesh) -> Matrix:
     """Return the derivative of `residual` at its fields and contact."""
     n, n_elements = len(k), mesh.n_elements
@@ -290,7 +257,7 @@ def matrix(x: Unknowns, z: FloatArray, c: Contact, k: Constants, mesh: Mesh) -> 
     rows[:, 1] *= k.grips[:, None, None, None]
     corner[:, 5, 4] *= k.grips
     corner[:, 5, 5] = ~k.grips
-    return _banded(element, sides, rows, corner)
+    return banded(element, sides, rows, corner)
 
 
 def _thickening(
@@ -357,52 +324,3 @@ def _belt_blocks(z: FloatArray, k: Constants, mesh: Mesh) -> FloatArray:
     blocks = ordered.reshape(n_elements, n * 9, -1) @ products
     out: FloatArray = blocks.reshape(n_elements, n, 3, 3, 4, 4).transpose(1, 0, 4, 2, 5, 3)
     return out
-
-
-@cache
-def _places(n_elements: int) -> tuple[Any, ...]:
-    """Return where element entries go: (chosen, target) of band, right side and lower side."""
-    node = (3 * np.arange(n_elements)[:, None] + np.arange(4)) % (3 * n_elements)
-    unknown = (WIDTH * (node[..., None] - 1) + np.arange(WIDTH)).reshape(n_elements, LOCAL)
-    row, column = np.broadcast_arrays(unknown[:, :, None], unknown[:, None, :])
-    # the last node's own block is added to the next element's first beforehand
-    last = np.arange(LOCAL) >= LOCAL - WIDTH
-    own = np.broadcast_to(last[:, None] & last[None, :], row.shape)
-    inner = (row >= 0) & (column >= 0) & ~own
-    band = column * (3 * BAND + 1) + 2 * BAND + row - column
-    right = (row >= 0) & (column < 0) & ~own
-    lower = (row < 0) & (column >= 0) & ~own
-    n_inner = WIDTH * (3 * n_elements - 1)
-    return (
-        np.flatnonzero(inner),
-        band[inner],
-        np.flatnonzero(right),
-        (row * BORDER + column + WIDTH)[right],
-        np.flatnonzero(lower),
-        ((row + WIDTH) * n_inner + column)[lower],
-        n_inner,
-    )
-
-
-def _banded(element: FloatArray, sides: FloatArray, rows: FloatArray, corner: FloatArray) -> Matrix:
-    n, n_elements = element.shape[:2]
-    own = element[:, :, 3, :, 3, :].copy()
-    element[:, :, 0, :, 0, :] += np.roll(own, 1, axis=1)
-    flat = element.reshape(n, -1)
-    chosen, to_band, from_right, to_right, from_lower, to_lower, n_inner = _places(n_elements)
-    band = np.zeros((n, n_inner * (3 * BAND + 1)))
-    band[:, to_band] = flat[:, chosen]
-    right = np.zeros((n, n_inner * BORDER))
-    right[:, to_right] = flat[:, from_right]
-    lower = np.zeros((n, BORDER * n_inner))
-    lower[:, to_lower] = flat[:, from_lower]
-    corner[:, :WIDTH, :WIDTH] = element[:, 0, 0, :, 0, :]
-    right = right.reshape(n, n_inner, BORDER)
-    lower = lower.reshape(n, BORDER, n_inner)
-    column = gathered(sides)  # (n, n_nodes, WIDTH, 2)
-    right[:, :, WIDTH:] = column[:, 1:].reshape(n, n_inner, 2)
-    corner[:, :WIDTH, WIDTH:] = column[:, 0]
-    line = gathered(np.moveaxis(rows, 1, -1))
-    lower[:, WIDTH:] = np.moveaxis(line[:, 1:].reshape(n, n_inner, 2), 1, 2)
-    corner[:, WIDTH:, :WIDTH] = np.moveaxis(line[:, 0], 1, 2)
-    return Matrix(band.reshape(n, n_inner, 3 * BAND + 1), right, lower, corner)

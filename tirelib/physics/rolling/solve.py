@@ -10,16 +10,14 @@ from scipy.linalg import lapack
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.physics.rolling.assemble import (
-    BAND,
-    BORDER,
     Contact,
-    Matrix,
     Unknowns,
     by_element,
     contact,
     matrix,
     residual,
 )
+from tirelib.physics.rolling.band import BAND, BORDER, Matrix
 from tirelib.physics.rolling.constants import Constants
 from tirelib.physics.rolling.gage import Gage, strain
 from tirelib.physics.rolling.mesh import COARSE, FINE, PATCH, Mesh, mesh, to_grid
