@@ -325,14 +325,14 @@ def _idle(candidates: "Sequence[Mapping[str, Any]]", keys: list[str]) -> set[str
 
 
 def _say(document: dict[str, Any]) -> None:
-    from tirelib.inference.planning.criterion import LEAST
+    from tirelib.inference.planning.criterion import LEAST_SEPARATION
     from tirelib.inference.planning.envelope import AXES
 
     console = output()
     console.print(f"{document['campaign']}, {document['quantity']}: {document['why']}")
     console.print(f"  {document['message']}")
     candidates = document["candidates"]
-    if max((entry["separation"] for entry in candidates), default=0.0) < LEAST:
+    if max((entry["separation"] for entry in candidates), default=0.0) < LEAST_SEPARATION:
         return
     table = Table(box=SIMPLE_HEAD)
     axes = [axis for axis in AXES.values() if axis.key in candidates[0]]

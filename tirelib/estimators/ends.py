@@ -16,9 +16,9 @@ from tirelib.estimators.ridge import Ridge, ridge_fits
 
 INSIDE_SHARE = 0.9
 """Share of the calibrated rows whose leverage counts as inside the data."""
-FAR = 0.95
+CHECKED_SHARE = 0.95
 """Share of what was held out up to whose leverage a turn counts as checked."""
-SHARE = 0.12
+LEFT_OUT_SHARE = 0.12
 """Share of the rows that is left out on one side of a condition; a level is left out whole."""
 LEVEL = 0.03
 """Rows that lie within this share of a condition's range belong to one level."""
@@ -71,7 +71,7 @@ def outermost(conditions: Mapping[str, FloatArray]) -> Iterator[BoolArray]:
         if not np.isfinite(span) or span == 0.0:
             continue
         for side in (x, -x):
-            rows = side >= np.quantile(side, 1.0 - SHARE) - LEVEL * span
+            rows = side >= np.quantile(side, 1.0 - LEFT_OUT_SHARE) - LEVEL * span
             if rows.mean() <= MOST_BEYOND and np.ptp(side[~rows]) >= LEAST_REST * span:
                 yield rows
 

@@ -15,7 +15,7 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import CalibrationError
 from tirelib.estimators.basis import Powers
 from tirelib.estimators.border import Border
-from tirelib.estimators.ends import FAR, End, growth, left_out, near
+from tirelib.estimators.ends import CHECKED_SHARE, End, growth, left_out, near
 from tirelib.estimators.folds import held_out_folds
 from tirelib.estimators.polynomial import Polynomial, Variable, design, leverage
 from tirelib.estimators.ridge import ridge_fit, ridge_fits
@@ -147,7 +147,7 @@ def fit_best(
         # held-out errors, not the fit's own residuals, say how large an error to expect
         inflation = max(1.0, float(np.average(error**2 / held_variance, weights=weights)))
         ends, reach = _ends(x, y, between, outermost, weights, centre)
-        reach = found.noise**2 * max(reach, float(np.quantile(held_leverage, FAR)))
+        reach = found.noise**2 * max(reach, float(np.quantile(held_leverage, CHECKED_SHARE)))
         root = np.sqrt(weights)
         model = Polynomial(
             variables=variables,
@@ -206,7 +206,7 @@ def _ends(
     sets = [*(rows for rows, _ in between), *outermost]
     ends = left_out(x, y, weights, centre, sets)
     reach = [
-        float(np.quantile(end.uncertain[inside], FAR)) / end.noise**2
+        float(np.quantile(end.uncertain[inside], CHECKED_SHARE)) / end.noise**2
         for end, (_, inside) in zip(ends, between, strict=False)
     ]
     return ends, max(reach, default=0.0)

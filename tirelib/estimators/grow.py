@@ -25,7 +25,7 @@ from tirelib.estimators.ridge import ridge_fit
 
 GAIN = 0.97
 """Ratio of held-out errors below which a family is worth its terms."""
-SHARE = 0.4
+TERMS_PER_CONDITION = 0.4
 """Terms per distinct condition up to which families are taken up."""
 
 
@@ -58,7 +58,7 @@ def grow(
         Where to begin; an empty list comes back if there are too few conditions for any.
     families : mapping of term lists by name
     """
-    most = SHARE * np.unique(groups).size
+    most = TERMS_PER_CONDITION * np.unique(groups).size
     judged: dict[frozenset[frozenset[tuple[str, int]]], Errors] = {}
 
     def judge(terms: Sequence[Powers]) -> Errors:

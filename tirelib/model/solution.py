@@ -38,7 +38,7 @@ from tirelib.physics.rolling.gage import Gage
 from tirelib.physics.rolling.solve import Rolling, solve
 
 Values = Mapping[str, float | FloatArray]
-SAME = (
+RING_CONSTANTS = (
     *("radius", "free_radius", "EI", "mass", "rotary_inertia", "k_u", "k_v"),
     *("softening", "dashpots", "k_t", "hardening", "thickness"),
 )
@@ -142,7 +142,7 @@ def made_with(
     before = State.of(values, points, GRID)
     after = at_depth(before, constants, depth)
     k = made.constants.but(
-        **{name: getattr(after, name) for name in SAME},
+        **{name: getattr(after, name) for name in RING_CONSTANTS},
         EA=np.minimum(after.EA, STIFFEST),
         # a state's shear stiffness is the tire's less the tension
         GA=np.minimum(after.GA + before.belt_tension, STIFFEST),

@@ -74,14 +74,14 @@ def simulate_file(
     )
     check_range("inflation pressure", p, FIELDS["pressure"].highest, "bar", "pressure")
     check_turn_rate(tire, omega)
-    conditions = Conditions(p, omega, lean, warm)
+    conditions = RollingConditions(p, omega, lean, warm)
     if load is not None:
         return simulate_model(model, tire, conditions, load=target)
     return simulate_model(model, tire, conditions, deflection=target)
 
 
 @dataclass(frozen=True, slots=True)
-class Conditions:
+class RollingConditions:
     """Operating points; arrays of shape (n_points,), SI.
 
     Attributes
@@ -119,7 +119,7 @@ class Conditions:
 def simulate_model(
     model: TireModel,
     tire: Tire,
-    conditions: Conditions,
+    conditions: RollingConditions,
     *,
     load: FloatArray | None = None,
     deflection: FloatArray | None = None,
@@ -132,7 +132,7 @@ def simulate_model(
     model : TireModel
     tire : Tire
         The model's, with the damping that is to be simulated.
-    conditions : Conditions
+    conditions : RollingConditions
     load, deflection : shape (n_points,), [N], [m]
         One of the two.
     low_pass : LowPass, optional
@@ -157,7 +157,7 @@ def simulate_model(
     return _simulation(tire, curves, found.deflection, points)
 
 
-def _check_known(model: TireModel, conditions: Conditions) -> None:
+def _check_known(model: TireModel, conditions: RollingConditions) -> None:
     wants = [u.effect.name for u in model.used if u.effect.varies_with == ("temperature",)]
     if wants and not np.isfinite(conditions.temperature).all():
         raise ParameterError(
@@ -177,7 +177,7 @@ def _pressed(
 def _load_at(
     model: TireModel,
     values: Mapping[str, float | FloatArray],
-    conditions: Conditions,
+    conditions: RollingConditions,
     deflection: FloatArray,
     low_pass: LowPass,
     tire: Tire,

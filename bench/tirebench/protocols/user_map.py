@@ -56,7 +56,7 @@ from typing import Any
 from tirebench.errors import DeviceError, cause
 from tirebench.protocols.map_messages import Message, kind_of, listed, of_dbc
 from tirebench.protocols.map_parts import CarriedQuantity, UserMap, WheelMap, clashes
-from tirebench.protocols.map_reader import MapReader, is_wheel
+from tirebench.protocols.map_signals import SignalLookup, is_wheel
 from tirebench.wire.conditions import HOLD, TELLABLE
 from tirebench.wire.device import Device
 from tirebench.wire.frames import MOST_GAGES
@@ -115,7 +115,7 @@ def parse_map(text: str, dbc: str, where: str) -> UserMap:
     return _Reader(document, where).read(text if not dbc else f"{text}\0{dbc}", dbc)
 
 
-class _Reader(MapReader):
+class _Reader(SignalLookup):
     """Reads a map."""
 
     def __init__(self, document: dict[str, Any], where: str) -> None:

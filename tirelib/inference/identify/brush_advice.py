@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from tirelib.core.arrays import FloatArray
-from tirelib.inference.identify.brush_cells import Conditions, sliding_slips
+from tirelib.inference.identify.brush_cells import CellConditions, sliding_slips
 from tirelib.inference.identify.brush_law import point_parameters
 from tirelib.inference.identify.brush_misfit import ForceMisfit, Shape, kernel
 from tirelib.inference.identify.brush_problem import ASSUMED_HALF_LENGTH, BrushProblem
@@ -189,7 +189,7 @@ def _information(
     else:
         shape, variance = known.shape, min(known.variance, _MOST_VARIANCE)
     brush = point_parameters(_values(study), joined, study.fit.reference, here.half)
-    at = Conditions(
+    at = CellConditions(
         joined.load,
         np.nan_to_num(joined.pressure, nan=1.0),
         joined.slip_angle,
@@ -223,7 +223,7 @@ def _steady(
     return ForceData(load, pressure, angle, ratio, camber, unknown, one, one, one, block)
 
 
-def _points(at: Conditions) -> ForceData:
+def _points(at: CellConditions) -> ForceData:
     return _steady(at.load, at.pressure, at.slip_angle, at.slip_ratio, at.camber)
 
 

@@ -20,7 +20,7 @@ _SLIPS = 36
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Conditions:
+class CellConditions:
     """Where forces are looked at, arrays of shape (m,).
 
     Attributes
@@ -46,7 +46,7 @@ class Cells:
     Attributes
     ----------
     force : str
-    at : Conditions
+    at : CellConditions
         Means over the cells.
     misfit : shape (m,)
         Mean of measured less predicted.
@@ -60,7 +60,7 @@ class Cells:
     """
 
     force: str
-    at: Conditions
+    at: CellConditions
     misfit: FloatArray
     smooth: FloatArray
     slope: FloatArray
@@ -85,7 +85,7 @@ def cells_of(problem: BrushProblem, z: FloatArray, robust: float | None) -> tupl
         if robust is not None:
             weight = weight * robust / np.maximum(np.abs(residual[k]), robust)
         mean = _Mean(number, weight)
-        at = Conditions(
+        at = CellConditions(
             mean(data.load),
             mean(np.nan_to_num(data.pressure, nan=1.0)),
             mean(data.slip_angle),

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from tirelib.core.arrays import FloatArray
-from tirelib.inference.identify.brush_cells import Cells, Conditions
+from tirelib.inference.identify.brush_cells import CellConditions, Cells
 
 LENGTHS = (0.5, 1.0, 2.0)
 """Over the slip, in units of the slip at which the whole contact slides."""
@@ -195,7 +195,7 @@ def misfit_of(
     return Misfit(tuple(_told(each, load) for each in cells), load, pressure)
 
 
-def kernel(force: str, shape: Shape, at: Conditions, load: float) -> FloatArray:
+def kernel(force: str, shape: Shape, at: CellConditions, load: float) -> FloatArray:
     """Return the covariance of the smooth misfit over places, variance 1 far out, shape (m, m)."""
     own, other = at.slip_angle / at.slide_angle, at.slip_ratio / at.slide_ratio
     if force == "Fx":
@@ -231,7 +231,7 @@ def _told(cells: Cells, load: float) -> ForceMisfit:
     take = np.arange(cells.misfit.size)
     if take.size > _MOST_FOR_LENGTHS:
         take = np.random.default_rng(0).permutation(take)[:_MOST_FOR_LENGTHS]
-    at = Conditions(*(getattr(cells.at, name)[take] for name in Conditions.__slots__))
+    at = CellConditions(*(getattr(cells.at, name)[take] for name in CellConditions.__slots__))
     left, size, _ = np.linalg.svd(cells.slope[take], full_matrices=True)
     rank = int((size > 1e-7 * size[0]).sum()) if size.size else 0
     rest = left[:, rank:].T
@@ -254,10 +254,10 @@ def _told(cells: Cells, load: float) -> ForceMisfit:
     return ForceMisfit(cells, shapes[best], float(variance[best]), freedom, evidence)
 
 
-def _joined(at: Conditions, terms: Sequence[Term]) -> Conditions:
+def _joined(at: CellConditions, terms: Sequence[Term]) -> CellConditions:
     names = ("load", "pressure", "slip_angle", "slip_ratio", "slide_angle", "slide_ratio")
     parts = {name: np.array([getattr(t, name) for t in terms]) for name in names}
     parts["camber"] = np.zeros(len(terms))
-    return Conditions(
-        *(np.concatenate([getattr(at, name), parts[name]]) for name in Conditions.__slots__)
+    return CellConditions(
+        *(np.concatenate([getattr(at, name), parts[name]]) for name in CellConditions.__slots__)
     )

@@ -10,7 +10,7 @@ from tirelib.inference.planning.envelope import Envelope
 
 NOTHING = "no_effect"
 """Name of the rival that needs no further effect."""
-LEAST = 1.0
+LEAST_SEPARATION = 1.0
 """Separation below which a run tells nothing: noise alone moves the chi-square of one number so."""
 WANTED = 20.0
 """Separation that one asks for: odds of e^10 against the wrong rival."""
@@ -158,5 +158,5 @@ class NextTest:
     def hopeless(self) -> bool:
         """Whether no run parts any of the open pairs."""
         return bool(self.open_pairs) and all(
-            float(np.max(pair.separation)) < LEAST for pair in self.open_pairs
+            float(np.max(pair.separation)) < LEAST_SEPARATION for pair in self.open_pairs
         )

@@ -15,7 +15,7 @@ from tirelib.inference.identify.force_points import CELL_ANGLE, CELL_RATIO, Forc
 
 FEWEST_SLIPS = 4
 """Different slips that make a run one of several points."""
-SHARE = 0.5
+SERIES_SHARE = 0.5
 """Share of a campaign's points in such runs from which on they are its kind of run."""
 _LEVEL = 1000
 """Cells of one set point, in the numbers of `set_points`."""
@@ -96,7 +96,7 @@ def campaign_sweep(points: ForcePoints, name: str, wanted: bool | None = None) -
         for index in (np.flatnonzero(run == k) for k in range(int(run.max()) + 1))
         if np.unique(cell[index]).size >= FEWEST_SLIPS
     ]
-    if sum(index.size for index in several) > SHARE * len(points):
+    if sum(index.size for index in several) > SERIES_SHARE * len(points):
         chosen = max(several, key=lambda index: np.unique(cell[index]).size)
         return _once(name, slip[chosen], cell[chosen], points.slip_rate[chosen])
     if not wanted:

@@ -12,7 +12,7 @@ LARGEST_MISSING = 0.1
 """Share of missing samples with which an offset or a mean is still formed."""
 
 
-class Samples:
+class LastSamples:
     """Strain, held conditions and trigger of the last samples.
 
     Parameters

@@ -32,7 +32,7 @@ from tirelib.measured.signal.course import course
 from tirelib.measured.signal.lowpass import LowPass, half_width, smooth_to_angle
 from tirelib.measured.signal.offset import nothing_read, offset_at
 from tirelib.measured.signal.quality import UNUSABLE, inspect, without_contact
-from tirelib.measured.signal.samples import Samples
+from tirelib.measured.signal.samples import LastSamples
 from tirelib.measured.signal.slip import NOTHING, Rolled, pull, unseen_by_load, unseen_by_traction
 from tirelib.measured.signal.turn import PHI, Turn, Turns, stack_turns, unknown_turn
 
@@ -88,7 +88,7 @@ class TurnCutter:
         longest = int(LONGEST_TURN * rate)
         self._finder = ContactFinder(longest)
         self._keep = 2 * longest
-        self._samples = Samples(self._gages, self._centre, 2 * self._keep)
+        self._samples = LastSamples(self._gages, self._centre, 2 * self._keep)
         self._waiting: deque[Contact] = deque()
         self._previous: Contact | None = None
         self._previous_period = np.nan

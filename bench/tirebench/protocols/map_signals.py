@@ -11,7 +11,7 @@ from tirelib.core.units import to_si
 LONGEST_SIGNAL = 32
 
 
-class MapReader:
+class SignalLookup:
     """Collects every fault of a map before it raises."""
 
     def __init__(self, document: dict[str, Any], where: str) -> None:
