@@ -5,14 +5,14 @@ FMU beside this file, under a name of its own, so that FMUs of several versions 
 process.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import pythonfmu
 from pythonfmu import Fmi2Slave
 
 from tirelib.core.held import HELD
-from tirelib.fmu.remarks import strain_remark
+from tirelib.fmu.remarks import Remark, step_remark, strain_remark
 from tirelib.fmu.slave import GuardedSlave
 from tirelib.fmu.strain_variables import MISSING, inputs, outputs, parameters
 from tirelib.fmu.variables import Variable
@@ -69,15 +69,19 @@ class StrainTire(GuardedSlave, Fmi2Slave):
         count = self.other["samples"] if self._buffered else None
         frame, valid = real[self._frame], self.other["frame_valid"]
         changed: bool = wheel.step(frame, step, valid, *real[self._conditions], count=count)
-        for kind, remark in strain_remark(frame[: self._gages] if valid else ()).items():
-            self.remark(kind, remark.text(kind))
+        self.tell(step_remark(wheel.taken, self._samples))
+        self.tell(strain_remark(frame[: self._gages] if valid else ()))
         if wheel.ended:
-            for kind, remark in wheel.remarks(real[self._omega]).items():
-                self.remark(kind, remark.text(kind))
+            self.tell(wheel.remarks(real[self._omega]))
         if not changed:
             age = wheel.age
             real[self._age] = age if age == age else real[self._missing]
         return changed
+
+    def tell(self, found: Mapping[str, Remark]) -> None:
+        """Log remarks, once of each kind."""
+        for kind, remark in found.items():
+            self.remark(kind, remark.text(kind))
 
     def shown(self, values: Sequence[float]) -> Sequence[float]:
         """Return the Real outputs; what is missing as the parameter says."""

@@ -12,6 +12,7 @@ from tirelib.fmu.slave import GuardedSlave
 from tirelib.fmu.variables import Variable
 from tirelib.fmu.virtual.faults import Faults
 from tirelib.fmu.virtual.options import Options
+from tirelib.fmu.virtual.remarks import text
 from tirelib.fmu.virtual.surface import shared_surface
 from tirelib.fmu.virtual.table import inputs, outputs, parameters
 from tirelib.fmu.virtual.wheel import VirtualWheel
@@ -57,6 +58,11 @@ class VirtualTire(GuardedSlave, Fmi2Slave):
         return wheel
 
     def advance(self, step: float) -> bool:
-        """Fill the next frame."""
-        changed: bool = self.model.step(step, self.real[self._conditions])
+        """Fill the next frame; tell which inputs are out of range."""
+        given, surface = self.real[self._conditions], self._surface
+        changed: bool = self.model.step(step, given)
+        for name in self.model.outside:
+            at = surface.inputs.index(name)
+            ends = float(surface.low[at]), float(surface.high[at])
+            self.remark(name, text(name, given[at], *ends))
         return changed

@@ -96,8 +96,10 @@ static void find_slip(const Turned *t, int plausible, Prediction *result) {
     e->std = fabs(gain) * std;
     t->values[V_SLIP_RATIO] = e->value;
     t->values[V_SLIP_STD] = e->std;
+    Ends rolls = slip_range(t->values[V_CONTACT_ANGLE]);
     /* the radius depends on the pressure; at a low speed it is what it is at a higher one */
-    e->valid = valid(t, KAPPA, e->value, e->std) && plausible &&
+    e->valid = valid(t, KAPPA, e->value, e->std) && plausible && e->value > rolls.low &&
+               !(e->value >= rolls.high) &&
                pressure_allowed(&t->chain->laws, t->k, t->values) &&
                not_too_fast(&t->chain->laws, t->k, t->values);
     e->there = 1;

@@ -51,6 +51,11 @@ Ends pressure_range(const Laws *laws, const Constants *k) {
     return laws->pressure_fitted ? fitted : law;
 }
 
+Ends slip_range(double contact_angle) {
+    Ends ends = {-1.0, 2.0 * PI / contact_angle - 1.0};
+    return ends;
+}
+
 Ends speed_range(const Laws *laws, const Constants *k) {
     Ends ends = {fmin(k->slowest, 0.95 * laws->speed[0]),
                  laws->speed_fitted ? 1.05 * laws->speed[1] : k->fastest};

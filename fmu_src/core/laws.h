@@ -1,5 +1,5 @@
 /* What is assumed of conditions that a calibration did not vary. Reference:
- * tirelib.estimators.laws.ConditionLaws, methods of the same names. */
+ * tirelib.estimators.laws, functions and methods of the same names. */
 #ifndef TIRE_LAWS_H
 #define TIRE_LAWS_H
 
@@ -14,6 +14,7 @@ double load_correction(const Laws *laws, const Constants *k, const double *value
 double force_factor(const Laws *laws, const Constants *k, const double *values, double *std);
 double equivalent_load(const Laws *laws, double load, const double *values);
 Ends pressure_range(const Laws *laws, const Constants *k);
+Ends slip_range(double contact_angle);
 Ends speed_range(const Laws *laws, const Constants *k);
 int pressure_allowed(const Laws *laws, const Constants *k, const double *values);
 int not_too_fast(const Laws *laws, const Constants *k, const double *values);

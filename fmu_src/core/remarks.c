@@ -103,3 +103,8 @@ Remark strain_remark(const double *sample, int gages) {
             return remark_of(sample[g], -MOST_STRAIN, MOST_STRAIN, 0);
     return none;
 }
+
+Remark step_remark(double count, int samples) {
+    Remark none = {0, 0, 0.0, 0.0, 0.0};
+    return count > samples ? remark_of(count, 1.0, samples, 0) : none;
+}

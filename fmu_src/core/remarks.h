@@ -21,6 +21,7 @@ enum {
     COMBINATION_REMARK,
     OTHER_TIRE_REMARK,
     IMPLAUSIBLE_REMARK,
+    STEP_REMARK,
     REMARKS
 };
 
@@ -36,5 +37,8 @@ void wheel_remarks(const Wheel *wheel, double omega, Remark remark[REMARKS]);
 
 /* What cannot be strain in a sample of all gages. Reference: strain_remark; test: test_remarks. */
 Remark strain_remark(const double *sample, int gages);
+
+/* Whether a step brings more samples than a frame holds. Reference: step_remark; test: test_remarks. */
+Remark step_remark(double count, int samples);
 
 #endif

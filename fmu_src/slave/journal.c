@@ -20,15 +20,16 @@ static size_t filled(const char *text, const char *const word[4], const char *co
 }
 
 /* Reference: Remark.text */
-void slave_remark(Slave *s, int kind, const Remark *r) {
+void slave_remark(Slave *s, int kind, const Remark *r, const char *name) {
     static const char *const WORD[4] = {"{name}", "{value}", "{low}", "{high}"};
     char line[LINE], number[3][32];
     const double given[3] = {r->value, r->low, r->high};
-    const char *value[4] = {s->own.remark[REMARKS + r->name], number[0], number[1], number[2]};
+    const char *value[4] = {name, number[0], number[1], number[2]};
     size_t n = 0;
     if (s->remarked & (1u << kind)) return;
     s->remarked |= 1u << kind;
-    for (int i = 0; i < 3; i++) snprintf(number[i], sizeof number[i], "%g", given[i]);
+    for (int i = 0; i < 3; i++) /* the sign of a NaN says nothing */
+        snprintf(number[i], sizeof number[i], "%g", isnan(given[i]) ? fabs(given[i]) : given[i]);
     for (const char *c = s->own.remark[kind], *found = c; *c && n < LINE - 1;) {
         size_t taken = filled(c, WORD, value, &found);
         if (taken)

@@ -90,8 +90,8 @@ void slave_tell(const Slave *s, const char *text);
 void slave_complain(Slave *s, const char *cause);
 int slave_failed(Slave *s, const char *format, ...);
 
-/* Tell, as a warning and once for each kind, what is out of range. */
-void slave_remark(Slave *s, int kind, const Remark *remark);
+/* Tell, as a warning and once for each kind, what is out of range; `name` is filled in. */
+void slave_remark(Slave *s, int kind, const Remark *remark, const char *name);
 
 /* Add a word to the status, by semicolons; one with the cause, without the semicolon. */
 void slave_add(Slave *s, const char *word);

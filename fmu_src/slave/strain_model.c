@@ -31,7 +31,8 @@ static void tell_remarks(Slave *s) {
     Remark remark[REMARKS];
     wheel_remarks(s->wheel, s->real[s->conditions + OMEGA], remark);
     for (int kind = 0; kind < REMARKS; kind++)
-        if (remark[kind].holds) slave_remark(s, kind, &remark[kind]);
+        if (remark[kind].holds)
+            slave_remark(s, kind, &remark[kind], s->own.remark[REMARKS + remark[kind].name]);
 }
 
 /* Write the outputs. Reference: GuardedSlave.publish, StrainTire.shown */
@@ -251,8 +252,10 @@ static int step(Slave *s, double step) {
                  "ParameterError: the low-pass would reach beyond the samples of the turn");
         slave_complain(s, s->cause);
     }
+    Remark beyond = step_remark(s->buffered ? 0.0 : rint(step * rate), s->samples);
     Remark strange = strain_remark(s->real + s->frame, s->gages);
-    if (valid && strange.holds) slave_remark(s, IMPLAUSIBLE_REMARK, &strange);
+    if (beyond.holds) slave_remark(s, STEP_REMARK, &beyond, "");
+    if (valid && strange.holds) slave_remark(s, IMPLAUSIBLE_REMARK, &strange, "");
     return DONE;
 }
 

@@ -27,7 +27,7 @@ static size_t starts(const Slave *s) { return V_PARAMETERS + (size_t)s->surface.
 static int place(Slave *s) {
     for (int inputs = 6; inputs <= MOST_INPUTS; inputs++) {
         size_t behind = V_PARAMETERS + (size_t)inputs;
-        if (s->own.numbers > behind &&
+        if (s->own.numbers > behind && s->own.remarks == MOST_INPUTS &&
             tire_surface_read(&s->surface, s->own.table, s->own.numbers - behind) &&
             s->surface.inputs == inputs) {
             s->gages = s->surface.gages;
@@ -143,6 +143,16 @@ static void foresee(Slave *s) {
     publish(s);
 }
 
+/* Tell which inputs are out of range. Reference: VirtualTire.advance */
+static void tell_outside(Slave *s) {
+    const double *given = s->real + s->conditions;
+    int bits = rolling_outside(&s->surface, given);
+    for (int i = 0; i < s->surface.inputs; i++) {
+        Remark beyond = {1, 0, given[i], s->surface.low[i], s->surface.high[i]};
+        if (bits & 1 << i) slave_remark(s, i, &beyond, "");
+    }
+}
+
 static int step(Slave *s, double step) {
     double most = 0.0, rate = s->tire->options.rate, frame = s->samples / rate;
     switch (rolling_step(s->tire, &s->surface, step, s->real + s->conditions, &most)) {
@@ -155,6 +165,7 @@ static int step(Slave *s, double step) {
                             "to %d, the frame's length; step by %g s",
                             step, most, rate, s->samples, frame);
     }
+    tell_outside(s);
     return DONE;
 }
 

@@ -178,6 +178,11 @@ static void measure(RollingTire *w, const TireSurface *s, const double *given, i
     w->last_once = 1;
 }
 
+int rolling_outside(const TireSurface *s, const double *inputs) {
+    const int held = 1 << IN_ALPHA | 1 << IN_KAPPA | 1 << IN_SPEED;
+    return tire_outside(s, inputs) & ~(still(inputs) ? held : 0);
+}
+
 /* Which of the relaxed inputs are still out of range at the ends of a step. */
 static int lag_outside(const RollingTire *w, const TireSurface *s, const double *given, double a,
                        double b, int order[2]) {
@@ -192,9 +197,7 @@ static int lag_outside(const RollingTire *w, const TireSurface *s, const double 
 /* Move on by a step [s] with n samples; the last one was `due` samples before. */
 static void take(RollingTire *w, const TireSurface *s, const double *given, double step, double due,
                  int n) {
-    const int held = 1 << IN_ALPHA | 1 << IN_KAPPA | 1 << IN_SPEED;
-    int why = still(given), order[2] = {0, 0};
-    order[0] = tire_outside(s, given) & ~(why ? held : 0);
+    int why = still(given), order[2] = {rolling_outside(s, given), 0};
     double omega = why ? 0.0 : turn_rate(w, s, given, order[0]);
     int settled = aim(w, given + IN_ALPHA, given[IN_SPEED]);
     double first = (1.0 - due) / w->options.rate, condition[MOST_INPUTS];

@@ -32,6 +32,9 @@ typedef struct {
     double frame[MOST_FRAME * TIRE_GAGES];
 } RollingTire;
 
+/* Which inputs, a bit each, are out of range. Reference: VirtualWheel.outside */
+int rolling_outside(const TireSurface *s, const double *inputs);
+
 /* Start a tire: its first conditions act at once, and the sample at time zero is given. */
 void rolling_start(RollingTire *w, const TireSurface *s, const TireOptions *options, int samples,
                    const double *inputs);

@@ -76,6 +76,47 @@ def test_what_cannot_be_is_named_held_and_forgotten(ten: Host, inputs: dict[str,
     assert np.isfinite(ten.frame()).all()
 
 
+WRONG = {
+    "Fz": (-4000.0, "Fz_out_of_range: Fz [N] = -4000; the virtual tire holds for 800 .. 9000; "),
+    "alpha": (3.0, "alpha_out_of_range: alpha [rad] = 3; the virtual tire holds for -0.139626 .. "),
+    "kappa": (
+        -0.3,
+        "kappa_out_of_range: kappa [1] = -0.3; the virtual tire holds for -0.12 .. 0.12",
+    ),
+    "camber": (np.nan, "camber_out_of_range: camber [rad] = nan; the virtual tire holds for -0.06"),
+    "speed": (65.0, "speed_out_of_range: speed [m/s] = 65; the virtual tire holds for 5.5"),
+    "pressure": (2.3, "pressure_out_of_range: pressure [Pa] = 2.3; the virtual tire holds for 180"),
+}
+"""By input: what cannot be, and how the log begins that says it."""
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_an_input_out_of_range_is_logged_once_with_its_value_range_and_remedy(
+    ten: Host, name: str
+) -> None:
+    value, said = WRONG[name]
+    for _ in range(2):  # a reset lets it be logged again
+        ten.messages.clear()
+        ten.start()
+        ten.put(**{name: value})
+        ten.play(3)
+        ten.put(**TYPICAL)
+        ten.play(3)
+        ten.put(**{name: value})
+        ten.play(3)
+        (line,) = ten.messages
+        assert line.startswith(said)
+        assert "beyond, the last frame is held: give it in " in line
+
+
+def test_what_a_wheel_that_stands_does_not_need_is_not_logged(ten: Host) -> None:
+    ten.messages.clear()
+    ten.start()
+    ten.put(speed=0.0, kappa=9.0, alpha=-np.nan)
+    ten.play(3)
+    assert not ten.messages
+
+
 @pytest.mark.parametrize(
     ("step", "cause"),
     [

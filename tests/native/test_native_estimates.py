@@ -91,7 +91,8 @@ def disturbed(features: Features, n: int, seed: int) -> Features:
     some("pressure", x["pressure"] * rng.uniform(0.4, 1.6, n), 0.4)
     some("pressure", one_of(np.nan, np.inf, 0.0, -1e5), 0.2)
     some("speed", x["speed"] * rng.uniform(0.1, 3.5, n), 0.4)
-    some("speed", one_of(np.nan, -12.0), 0.1)
+    some("speed", one_of(np.nan, -12.0, 0.01), 0.1)
+    some("omega", -x["omega"], 0.02)
     some("camber", rng.normal(0.0, 0.04, n), 0.3)
     some("camber", unknown, 0.4)
     some("friction", rng.uniform(0.2, 1.2, n), 0.5)
@@ -189,6 +190,7 @@ def varied(known: Calibration, name: str) -> Calibration:
         },
         "road known": {"road": Road((0.4, 1.0), (0.003, 0.007), (290.0, 330.0))},
         "road unknown": {"road": Road()},
+        "slip not varied": {"guards": {**full.guards, "kappa": ()}},
     }
     return without(known, **changes[name])
 
@@ -199,6 +201,7 @@ def varied(known: Calibration, name: str) -> Calibration:
         *("no load", "no radius", "no force", "no slip angle", "no curve", "no moment or drag"),
         *("no likeness", "no cloud", "near only", "pressure varied", "conditions unknown"),
         *("radius over load", "force over camber", "road known", "road unknown"),
+        "slip not varied",
     ],
 )
 def test_calibrations_that_lack_a_link_or_know_more(

@@ -26,6 +26,7 @@ CASES = {
     "strain in another unit": (4e3, 0.0, {}),
     "strain in microstrain": (4e3, 0.0, {}),
     "a gage out": (9e3, 0.1, {}),
+    "long steps": (4e3, 0.1, {}),
     "nothing": (4e3, 0.1, {}),
 }
 WANTED = {
@@ -46,6 +47,10 @@ WANTED = {
     "strain in microstrain": [r"strain_implausible: strain \[1\] = -?\d+\S*; allowed are -1 .*"],
     "strain in another unit": [r"strain_out_of_range: tension = \S+; calibrated .*"],
     "a gage out": [r"Fz_out_of_range: .*"],
+    "long steps": [
+        r"step_too_long: samples of a step \[1\] = 12; a frame holds 1 .. 10; .* "
+        r"--samples-per-step 12, or .*"
+    ],
     "nothing": [],
 }
 
@@ -72,7 +77,11 @@ def said(fmu: LoadedFmu, case: str, axes: str) -> list[str]:
     if case == "strain in microstrain":
         samples *= 1e6
     fmu.start(live.RATE, axes=axes)
-    assert sum(v["turn"] > 1 for v in play(fmu, samples, held(**known))) > 1
+    if case == "long steps":
+        for step in range(20):
+            fmu.slave.doStep(step, 12 / live.RATE)
+    else:
+        assert sum(v["turn"] > 1 for v in play(fmu, samples, held(**known))) > 1
     return list(fmu.messages)
 
 

@@ -25,7 +25,7 @@ from tirelib.estimators.angle_model import WIDEST, AngleModel
 from tirelib.estimators.any_road import slid
 from tirelib.estimators.doubt import moved_by
 from tirelib.estimators.estimate import Estimate
-from tirelib.estimators.laws import RADIUS_DOUBT, RADIUS_SHARE, ConditionLaws
+from tirelib.estimators.laws import RADIUS_DOUBT, RADIUS_SHARE, ConditionLaws, slip_range
 from tirelib.estimators.likeness import Likeness
 from tirelib.estimators.polynomial import Cloud, Polynomial, Range, all_inside
 from tirelib.estimators.sliding import FORCE_DOUBT, LOAD_DOUBT, SlidingCurve, Told
@@ -193,7 +193,9 @@ class Chain:
             values["slip_ratio"], values["slip_std"] = kappa, std
             # the radius depends on the pressure; at a low speed it is what it is at a higher one
             held = self.laws.pressure_allowed(values) & self.laws.not_too_fast(values)
-            valid = self._valid("kappa", values, kappa, std, near) & plausible & held
+            slowest, fastest = slip_range(values["contact_angle"])
+            rolls = (kappa > slowest) & ~(kappa >= fastest)
+            valid = self._valid("kappa", values, kappa, std, near) & plausible & held & rolls
             result["kappa"] = Estimate(kappa, std, valid)
         values["slip_size"] = np.abs(values["slip_ratio"])
         if self.force is not None:

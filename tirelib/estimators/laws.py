@@ -62,6 +62,16 @@ CALIBRATED_SLACK = 0.05
 """A condition that stays this close (relatively) to its calibrated range needs no law."""
 
 
+def slip_range(contact_angle: FloatArray) -> tuple[float, FloatArray]:
+    r"""Return between which slip ratios a wheel rolls forward, [1], for contacts of an angle [rad].
+
+    At the lower end it is locked, and beyond it would turn backwards. At the upper end the vehicle
+    moves in a turn, :math:`2 \pi R_{eff} / (1 + \kappa)`, as far as the contact is long,
+    :math:`R_{eff} \varphi`, and beyond the wheel spins on the spot.
+    """
+    return -1.0, 2.0 * np.pi / contact_angle - 1.0
+
+
 @dataclass(frozen=True, slots=True)
 class ConditionLaws:
     """Calibrated conditions, and whether each was varied.

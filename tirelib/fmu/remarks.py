@@ -44,6 +44,8 @@ TEXTS: Mapping[str, str] = {
     "check tire, order and wiring of the gages",
     "strain_implausible": "strain [1] = {value}; allowed are {low} .. {high}; nothing is valid "
     "beyond: give it as a ratio, 1e-6 for a microstrain",
+    "step_too_long": "samples of a step [1] = {value}; a frame holds {low} .. {high}; the others "
+    "are missing: build with --samples-per-step {value}, or step by fewer",
 }
 """By kind, in the order of ``remarks.h``. SI, as the inputs and outputs are; short enough for a
 line of the bench's page."""
@@ -79,6 +81,11 @@ def strain_remark(sample: Sequence[float]) -> dict[str, Remark]:
         if MOST_STRAIN < abs(value) < math.inf:
             return {"strain_implausible": Remark(value, -MOST_STRAIN, MOST_STRAIN)}
     return {}
+
+
+def step_remark(count: int, samples: int) -> dict[str, Remark]:
+    """Return whether a step brings more samples than a frame holds."""
+    return {"step_too_long": Remark(count, 1, samples)} if count > samples else {}
 
 
 def remarks(

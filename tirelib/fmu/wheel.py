@@ -67,6 +67,7 @@ class Wheel:
         self._known_step = math.nan, 0  # a communication step [s] and its samples
         self._seen: tuple[int, bool] | None = None
         self.ended = False  # whether the last step has ended a turn
+        self.taken = 0  # samples of the last step
         self._offset = 0.0  # time at which the estimator was started again, after a fault
         self._turns = 0  # turns before that
         self._fault = False
@@ -133,7 +134,7 @@ class Wheel:
             If the step or the count is not allowed; nothing has changed.
         """
         n = self.samples_in(step) if count is None else self._counted(step, count)
-        self.ended = False
+        self.ended, self.taken = False, n
         if n:
             known = [value if math.isfinite(value) else math.nan for value in conditions]
             turns = self._estimator.take(self._strain(frame, n, valid), known)

@@ -12,6 +12,7 @@ from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.estimate import QUANTITIES, Estimates
 from tirelib.estimators.laws import ConditionLaws
 from tirelib.estimators.polynomial import Range
+from tirelib.estimators.regressors import compute_regressors
 from tirelib.estimators.train import Trained
 from tirelib.measured.features import Features
 from tirelib.measured.observations import measure_run
@@ -98,6 +99,24 @@ def test_a_slip_ratio_that_was_not_calibrated_ends_load_force_and_slip_angle(
     blind = replace(features, omega=quick, speed=np.full_like(features.speed, np.nan))
     unknown = estimate(replace(trained.calibration, chains=chains), blind)
     assert unknown.valid["Fz"][usable].all()
+
+
+@BOTH
+def test_a_slip_ratio_that_no_rolling_wheel_has_is_not_valid(
+    estimate: Estimate, trained: Trained, features: Features
+) -> None:
+    """Backwards, or so quick that the wheel moves less in a turn than its contact is long."""
+    known, good = trained.calibration, trained.calibration.estimate(features)
+    usable = good.turn_valid
+    contact = compute_regressors(features, known.chains[-1].gages)["contact_angle"]
+    for share, valid in ((0.98, True), (1.02, False)):
+        quick = features.omega * share * 2.0 * np.pi / contact
+        found = estimate(known, replace(features, omega=quick))
+        assert (found.valid["kappa"][usable] == valid).all()
+    forward = estimate(known, replace(features, omega=1e-3 * features.omega))
+    backward = estimate(known, replace(features, omega=-1e-3 * features.omega))
+    assert forward.valid["kappa"][usable].all()
+    assert not backward.valid["kappa"].any()
 
 
 def test_a_speed_outside_the_calibration_doubts_by_two_percent_per_1600_m2_s2() -> None:

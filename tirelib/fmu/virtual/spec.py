@@ -19,6 +19,7 @@ from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.virtual.coordinates import FRICTION
 from tirelib.fmu.virtual.core_table import flat_table
 from tirelib.fmu.virtual.options import RATES, Options
+from tirelib.fmu.virtual.remarks import lines
 from tirelib.fmu.virtual.surface import Surface, read_surface
 from tirelib.fmu.virtual.table import START, inputs, outputs, parameters
 from tirelib.fmu.virtual.wheel import VirtualWheel
@@ -116,6 +117,7 @@ def virtual_tire(
             "index.html": _page(known, table, samples_per_step, sample_rate, python).encode()
         },
         icon=source_file("strain_tire.png").read_bytes(),
+        texts=lines(),
     )
 
 

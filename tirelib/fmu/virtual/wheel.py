@@ -68,6 +68,7 @@ class VirtualWheel:
         self._run: SteadyRun | None = None  # while the conditions stay
         self._last: FloatArray | None = None  # answer of the last sample
         self._held: FloatArray | None = None  # strain of a wheel that does not turn
+        self.outside: tuple[str, ...] = ()  # inputs of the last step that are out of range
 
     def begin(self, inputs: Sequence[float]) -> None:
         """Take the first conditions: slip starts settled, the sample at time zero is given."""
@@ -130,6 +131,7 @@ class VirtualWheel:
         still = _still(given)
         outside = self._surface.outside(given)
         wrong = tuple([name for name in outside if name not in _UNUSED[still]])
+        self.outside = wrong
         omega = 0.0 if still else self._turn_rate(given, wrong)
         settled = self._slip.aim(given[_ALPHA : _KAPPA + 1], given[_SPEED])
         first = (1.0 - due) / self._options.rate
