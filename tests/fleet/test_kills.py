@@ -157,26 +157,38 @@ def test_a_killed_client_and_then_the_same_again(
     assert len(set(finished(out))) == len(finished(out)) == COUNT
 
 
-def test_a_worker_that_starts_slowly_again_is_not_given_up() -> None:
+@pytest.fixture(scope="module")
+def own() -> Iterator[Client]:
+    """A cluster of this machine; Dask by itself would give up a worker that starts slowly again."""
     with (
         dask.config.set({"distributed.deploy.lost-worker-timeout": "0s"}),
         cluster.cluster(None, 1) as client,
     ):
-        (first,) = client.run(os.getpid).values()
-        os.kill(first, signal.SIGKILL)
-        second = client.submit(os.getpid, pure=False).result(timeout=PATIENCE)
+        yield client
+
+
+def test_a_worker_keeps_no_call_stacks_of_what_it_did(own: Client) -> None:
+    """The profiler of Dask would let it grow by the second."""
+
+    def stacks(dask_worker: object) -> tuple[bool, int]:
+        callbacks = dask_worker.periodic_callbacks  # type: ignore[attr-defined]
+        return "profile" in callbacks, len(dask_worker.io_loop.profile)  # type: ignore[attr-defined]
+
+    (found,) = own.run(stacks).values()
+    assert found == (False, 0)
+
+
+def test_an_interrupt_ends_no_worker_and_a_killed_one_that_starts_slowly_is_not_given_up(
+    own: Client,
+) -> None:
+    (first,) = own.run(os.getpid).values()
+    os.kill(first, signal.SIGINT)
+    assert own.submit(os.getpid, pure=False).result(timeout=PATIENCE) == first
+    os.kill(first, signal.SIGKILL)
+    second = own.submit(os.getpid, pure=False).result(timeout=PATIENCE)
     assert second != first
-
-
-def test_an_interrupt_of_the_terminal_ends_no_worker_and_no_other_in_its_place() -> None:
-    with cluster.cluster(None, 1) as client:
-        (first,) = client.run(os.getpid).values()
-        os.kill(first, signal.SIGINT)
-        assert client.submit(os.getpid, pure=False).result(timeout=PATIENCE) == first
-        os.kill(first, signal.SIGKILL)
-        second = client.submit(os.getpid, pure=False).result(timeout=PATIENCE)
-        os.kill(second, signal.SIGINT)
-        assert client.submit(os.getpid, pure=False).result(timeout=PATIENCE) == second
+    os.kill(second, signal.SIGINT)
+    assert own.submit(os.getpid, pure=False).result(timeout=PATIENCE) == second
 
 
 def test_an_interrupt_while_the_cluster_starts_ends_it_when_it_is_whole(
@@ -198,18 +210,6 @@ def test_an_interrupt_while_the_cluster_starts_ends_it_when_it_is_whole(
     finally:
         signal.signal(signal.SIGINT, before)
     assert started[0].status is Status.closed
-
-
-def test_a_worker_keeps_no_call_stacks_of_what_it_did() -> None:
-    """The profiler of Dask would let it grow by the second."""
-
-    def stacks(dask_worker: object) -> tuple[bool, int]:
-        callbacks = dask_worker.periodic_callbacks  # type: ignore[attr-defined]
-        return "profile" in callbacks, len(dask_worker.io_loop.profile)  # type: ignore[attr-defined]
-
-    with cluster.cluster(None, 1) as client:
-        (found,) = client.run(stacks).values()
-    assert found == (False, 0)
 
 
 def test_no_scheduler_at_the_address_is_said(monkeypatch: pytest.MonkeyPatch) -> None:

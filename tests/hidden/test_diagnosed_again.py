@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hidden.cases import load_case
 
@@ -43,8 +44,11 @@ def test_nothing_more_is_named_on_the_rig() -> None:
 def test_nothing_more_is_named_on_a_tire_of_finite_elements(
     shared: Callable[[str], Path],
 ) -> None:
-    """What such a tire shows by itself, shear, section inertia and a tread that sticks, is base."""
+    """What such a tire shows by itself, shear, section inertia and a tread that sticks, is base.
+
+    Every third of its 66 runs is taken: they are in random order and span its conditions.
+    """
     waves = measure_waveforms(read_campaign(shared("puzzle-b")))
-    first, second = twice(straight_runs(waves))
+    first, second = twice(straight_runs(waves.take(np.arange(0, len(waves), 3))))
     assert first.named == ("sidewall_damping",)
     assert (second.verdict.kind, second.named) == ("none", ())
