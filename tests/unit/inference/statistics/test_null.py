@@ -105,6 +105,7 @@ def test_a_familys_tires_are_judged_by_the_others_and_never_by_their_own() -> No
     found, swell = plain((FAMILIES[0], wide)), 0
     assert found.null.names[swell] == "swell"
     assert found.null.usual[1][swell] > 3.0
+    assert np.median(found.plain[1]) > np.median(found.plain[0])
 
 
 def test_the_limit_is_where_the_p_value_falls_to_the_level() -> None:
