@@ -7,7 +7,7 @@ import pytest
 
 from tirelib.campaign.mdf import read_mdf
 from tirelib.campaign.problem import Problem, raise_errors
-from tirelib.core.errors import Fault, FormatError, ParameterError, TirelibError
+from tirelib.core.errors import ConvergenceError, Fault, FormatError, ParameterError, TirelibError
 from tirelib.core.units import to_si
 
 HERE = Fault("M.toml, ring.mass", "-1 kg", "a mass is above 0", "correct it")
@@ -68,3 +68,8 @@ def test_an_unreadable_run_file_is_stated_in_parts(tmp_path: Path, content: byte
         read_mdf(path)
     (fault,) = raised.value.faults
     assert str(raised.value) == f"{fault.given}; {fault.allowed}; {fault.remedy}"
+
+
+def test_an_iteration_that_failed_in_another_process_keeps_its_iterate_and_residual() -> None:
+    there = pickle.loads(pickle.dumps(ConvergenceError("no contact", [1.0, 2.0], 0.5)))
+    assert (str(there), there.iterate, there.residual) == ("no contact", [1.0, 2.0], 0.5)
