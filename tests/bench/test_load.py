@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from tirebench.cli import program
 from tirebench.errors import DeviceError
 from tirebench.protocols.bus_load import (
+    Load,
     LoadPlan,
     frame_bits,
     highest_rate,
@@ -103,6 +104,23 @@ def test_the_highest_rate_fits_and_a_little_more_does_not() -> None:
         more = LoadPlan(plan.kind, plan.bitrate, plan.data_bitrate, plan.wheels, rate + 200.0)
         assert not load_of(more).fits
         assert suggestions(plan)[0] == f"{rate / 1e3:g} kHz sample rate on the same line"
+
+
+@pytest.mark.parametrize(
+    ("mean", "worst", "service", "fits"),
+    [
+        (0.78, 0.9, 0.015, True),
+        (0.78, 0.9, 0.025, False),
+        (0.7, 0.98, 0.015, True),
+        (0.7, 0.98, 0.025, False),
+    ],
+)
+def test_a_line_carries_its_service_frames_as_well(
+    mean: float, worst: float, service: float, fits: bool
+) -> None:
+    """Four fifths of the capacity on average, and all of it at worst."""
+    load = Load(mean, worst, service, 1e3, (0.0, 0.0), (0.0, 0.0), 0.0)
+    assert load.fits == fits
 
 
 def test_the_program_refuses_what_does_not_fit(tmp_path: Path) -> None:
