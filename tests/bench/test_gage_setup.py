@@ -164,6 +164,13 @@ def test_a_shunt_gives_each_gage_its_gain(tmp_path: Path) -> None:
     assert "gage 1" in str(wrong.exception)
 
 
+def test_a_shunt_of_a_device_that_has_gains_multiplies_them() -> None:
+    known = replace(WHEEL, gain=(1.0, 0.8, 1.25, 1.0, 2.0))
+    step = -1e-3 * np.array([1.0, 0.5, 1.6, 1.0, 0.9])
+    new = shunted(known, np.zeros(5), step, -1e-3, [2, 3, 5])
+    np.testing.assert_allclose(new.gain, [1.0, 1.6, 0.78125, 1.0, 2.0 / 0.9], rtol=1e-6)
+
+
 def test_one_recording_where_two_are_needed_does_not_swallow_an_option(tmp_path: Path) -> None:
     outcome = call("shunt", "--replay", "off.mcap", *SHUNT, "--out", tmp_path / "x.toml")
     assert outcome.exit_code == 2
