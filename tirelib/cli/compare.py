@@ -94,6 +94,11 @@ def compare(
             from tirelib.inference.compare.plot_data import plot_data, write_plot_data
 
             data = plot_data(found, campaign, file, planted, catalogue, progress=progress)
+    if quantity is None and found.quantity != "strain":
+        output().print(
+            f"{found.quantity} is compared: of the forces that were measured it has the largest "
+            "error; --quantity chooses another"
+        )
     write_told(found, out, json_file)
     if data_file is not None:
         write_plot_data(data_file, data)

@@ -308,6 +308,7 @@ def suggest_map(path: str | Path, options: CsvOptions | None = None) -> str:
     for item, reason in others:
         said = f"# {_quoted(item.name)}: {item.low:g} .. {item.high:g} {item.unit}".rstrip()
         lines.append(said + (f"; known as {item.quantity}, but {reason}" if reason else ""))
+    lines += [f"# {_quoted(name)} is left out: {why}" for name, why in table.left_out.items()]
     return "\n".join([*lines, ""])
 
 

@@ -19,6 +19,7 @@ from tests.unit.campaign.importing.importing_synthetic import (
     write_mat73,
     write_parquet,
 )
+from tirelib.campaign.importing.suggest import suggest_map
 from tirelib.campaign.mdf import Channel, Group, write_mdf
 
 
@@ -273,6 +274,7 @@ def test_text_where_numbers_should_be_is_named(refused: Refused, tmp_path: Path)
     lines[300] = ",".join(cells)
     file.write_text("\n".join(lines))
     says(refused(file), "column 'FZ' (Fz)", "line 301 holds 'fault', which is no number")
+    assert "# 'FZ' is left out: line 301 holds 'fault'" in suggest_map(file).replace('"', "'")
 
 
 def test_no_time_and_no_rate_is_named(refused: Refused, tmp_path: Path) -> None:
