@@ -259,16 +259,20 @@ def draw(steps: Steps, out: Path, day: Path, files: "LiveFiles", seen: Seen) -> 
     from tirelib.campaign import read_campaign
     from tirelib.estimators.calibration_file import read_calibration
     from tirelib.measured.signal import LowPass
-    from tirelib.report.page import Picture, Section, draw_all, write_page
+    from tirelib.report.page import Part, Picture, draw_all, write_page
 
     campaign, calibration = read_campaign(day), read_calibration(out / "calibration.toml")
     line = read_line(files, campaign)
     drawing = live_drawing(files, campaign, LowPass(calibration.order, calibration.cut_off))
     sections = [
-        Section(
-            "Line", "live", live_text(line), [live_table(files, line)], draw_all(out, [drawing])
+        Part(
+            "Line",
+            "live",
+            live_text(line),
+            [live_table(files, line)],
+            pictures=draw_all(out, [drawing]),
         ),
-        Section(
+        Part(
             "Live page",
             "page",
             seen.words,

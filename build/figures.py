@@ -18,7 +18,7 @@ from ring_figures import loads as over_load
 
 from tirelib.core.parameters import Tire, read_tire
 from tirelib.core.threads import one_thread
-from tirelib.report.page import Drawing, Section, draw_all, write_page
+from tirelib.report.page import Drawing, Part, draw_all, write_page
 from tirelib.report.simulation import Simulation
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -244,7 +244,7 @@ def main() -> None:
             pictures = draw_all(folder, wanted)
         missing += [picture for picture in pictures if not picture.file]
         if wanted:
-            sections.append(Section(title, f"part-{number}", pictures=pictures))
+            sections.append(Part(title, f"part-{number}", pictures=pictures))
     if not sections:
         parser.error(f"there is no figure {given.only}")
     page = write_page(

@@ -8,8 +8,7 @@ from plotly.subplots import make_subplots
 from cosim.antilock import END_SPEED, KINDS, SPEED, AntiLockStudy
 from cosim.antilock_roads import Road
 from tirelib.report.figures.compare_plot import Plot, styled_figure
-from tirelib.report.page import Table, number
-from tirelib.report.parts_page import Part
+from tirelib.report.page import Part, Table, number
 from tirelib.report.style import BLACK, GREEN, ORANGE
 
 LOOK = {

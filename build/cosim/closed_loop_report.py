@@ -11,8 +11,7 @@ from cosim.closed_loop import ROADS, BrakingRun, Outcome, Study
 from cosim.closed_loop_controller import SlipController
 from tirelib.core.arrays import FloatArray
 from tirelib.report.figures.compare_plot import Plot, styled_figure
-from tirelib.report.page import Table, number
-from tirelib.report.parts_page import Part
+from tirelib.report.page import Part, Table, number
 from tirelib.report.style import BLACK, BLUE, FAINT, GREEN, ORANGE
 
 LOOK = {

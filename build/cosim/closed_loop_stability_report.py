@@ -9,8 +9,7 @@ from plotly.subplots import make_subplots
 from cosim.closed_loop_report import EVERY, LOOK
 from cosim.closed_loop_stability import StabilityController, StabilityOutcome, Swerve
 from tirelib.report.figures.compare_plot import Plot, styled_figure
-from tirelib.report.page import Table, number
-from tirelib.report.parts_page import Part
+from tirelib.report.page import Part, Table, number
 from tirelib.report.style import FAINT
 
 UNCONTROLLED = "no control"

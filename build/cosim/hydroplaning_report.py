@@ -6,8 +6,7 @@ from plotly.subplots import make_subplots
 from cosim.antilock_report import EVERY, LOOK
 from cosim.hydroplaning import ALLOWED, BEGINS, PLACE, SPEED, Drives
 from tirelib.report.figures.compare_plot import Plot, styled_figure
-from tirelib.report.page import Table, number
-from tirelib.report.parts_page import Part
+from tirelib.report.page import Part, Table, number
 from tirelib.report.style import FAINT
 
 NOTE = (

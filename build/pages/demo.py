@@ -27,7 +27,7 @@ from tirelib.report.accuracy import QUANTITIES, Accuracy, accuracy, compare
 from tirelib.report.calibration import regression_drawings
 from tirelib.report.estimate import accuracy_table
 from tirelib.report.figures.regression import find_regression, in_use, rms
-from tirelib.report.page import DASH, Drawing, Section, Table, draw_all, number, write_page
+from tirelib.report.page import DASH, Drawing, Part, Table, draw_all, number, write_page
 
 NEEDED = ("set1", "set1-unseen")
 OPTIONAL = ("set2", "brake_drive", "brake_drive-unseen", "set3")
@@ -96,7 +96,7 @@ def write_demo_page(
     sections = []
     for title, anchor, text, drawings in _parts(seen, trained, camber, calibration):
         say(f"drawing: {title.lower()}")
-        sections.append(Section(title, anchor, text, pictures=draw_all(folder, drawings)))
+        sections.append(Part(title, anchor, text, pictures=draw_all(folder, drawings)))
     if live is not None:
         say("drawing: live")
         sections.insert(1, _live(folder, live, seen["set1-unseen"].campaign, low_pass))
@@ -131,10 +131,10 @@ def _lead(seen: Mapping[str, Seen], calibration: Calibration) -> str:
     )
 
 
-def _live(folder: Path, live: LiveFiles, campaign: Campaign, low_pass: LowPass) -> Section:
+def _live(folder: Path, live: LiveFiles, campaign: Campaign, low_pass: LowPass) -> Part:
     line = read_line(live, campaign)
     drawing = live_drawing(live, campaign, low_pass)
-    return Section(
+    return Part(
         "Live",
         "live",
         live_text(line),

@@ -12,7 +12,7 @@ from tirelib.estimators.train import Trained
 from tirelib.report import figures
 from tirelib.report.accuracy import QUANTITIES, TITLE
 from tirelib.report.estimate import write_estimate_report
-from tirelib.report.page import Drawing, Section, draw_all, number, write_page
+from tirelib.report.page import Drawing, Part, draw_all, number, write_page
 from tirelib.report.statistics import (
     estimator_tables,
     held_out_table,
@@ -20,6 +20,7 @@ from tirelib.report.statistics import (
     refused_table,
     regression_tables,
 )
+from tirelib.report.style import AXES_NAME
 
 
 def write_calibration_report(
@@ -49,14 +50,14 @@ def write_calibration_report(
     folder = Path(folder)
     calibration = trained.calibration
     sections = [
-        Section(
+        Part(
             "Estimators that this calibration uses",
             "in-use",
             "Each estimator is a polynomial in a few regressors. Its terms were selected by "
             "cross-validation over held-out conditions.",
             [in_use_table(trained), *estimator_tables(trained)],
         ),
-        Section(
+        Part(
             "Residuals",
             "residuals",
             "Each point is one independent measurement (a run, or a turn of a sweep), estimated "
@@ -67,34 +68,32 @@ def write_calibration_report(
     ]
     if held_out:
         sections.append(
-            Section(
-                "Errors at held-out levels", "held-out", tables=[held_out_table(list(held_out))]
-            )
+            Part("Errors at held-out levels", "held-out", tables=[held_out_table(list(held_out))])
         )
     sections.append(
-        Section(
+        Part(
             "The dissertation's regressions",
             "regressions",
             "Ordinary least squares on run means, as in section 4.1 of the dissertation. Lengths "
             "in mm, strains in microstrain, forces in N, angles in deg, signs ISO 8855 (the "
             "dissertation prints SAE: Fy, slip angle and left and right change sign).",
             regression_tables(trained.regressions),
-            draw_all(folder, regression_drawings(trained)),
+            pictures=draw_all(folder, regression_drawings(trained)),
         )
     )
     if trained.links.refused:
-        sections.append(Section("Not calibrated", "refused", tables=[refused_table(trained)]))
+        sections.append(Part("Not calibrated", "refused", tables=[refused_table(trained)]))
+    gages = ", ".join(number(1e3 * y, 3) for y in calibration.lateral)
+    low_pass = f"order {number(calibration.order)} of the turn rate"
+    if calibration.cut_off:
+        low_pass = f"{number(calibration.cut_off)} Hz"
     return write_page(
         folder,
-        "calibration.html",
+        "base.html",
         title=title or f"Calibration: {calibration.tire}",
-        tire=calibration.tire,
-        gages=", ".join(number(1e3 * y, 3) for y in calibration.lateral),
-        measurements=trained.links.unit.size,
-        conditions=np.unique(trained.links.groups).size,
-        low_pass=f"{number(calibration.cut_off)} Hz"
-        if calibration.cut_off
-        else f"order {number(calibration.order)} of the turn rate",
+        summary=f"Tire {calibration.tire}; gages at y = {gages} mm ({AXES_NAME}); "
+        f"{trained.links.unit.size} independent measurements at "
+        f"{np.unique(trained.links.groups).size} conditions; low-pass {low_pass}.",
         sections=sections,
     )
 

@@ -21,8 +21,8 @@ from tirelib.report.figures.compare_forces import curve_plots, force_plots, forc
 from tirelib.report.figures.compare_heat import gage_plots, heat_maps
 from tirelib.report.figures.compare_trends import set_point_plot, track_plots, trend_plots
 from tirelib.report.figures.compare_waveforms import waveform_plots
-from tirelib.report.page import Table, number
-from tirelib.report.parts_page import Part, write_parts_page
+from tirelib.report.page import Part, Table, number
+from tirelib.report.parts_page import write_parts_page
 
 SENTENCE_NOTE = (
     "Only significant differences are listed. Against noise and set-point errors the chance is 1 "

@@ -16,8 +16,8 @@ from tirelib.report.figures.compare_plot import Plot, styled_figure
 from tirelib.report.figures.force_left import force_maps
 from tirelib.report.figures.strain_left import strain_maps
 from tirelib.report.figures.waterfall import Step, waterfall, waterfall_of
-from tirelib.report.page import Table, number, numbers, unit_name
-from tirelib.report.parts_page import Part, write_parts_page
+from tirelib.report.page import Part, Table, number, numbers, unit_name
+from tirelib.report.parts_page import write_parts_page
 from tirelib.report.style import BLUE, FAINT, INK, RED
 
 TITLE = "Which effect is missing"

@@ -10,7 +10,8 @@ from tirelib.estimators.estimate import Estimates
 from tirelib.measured.observations import Observations
 from tirelib.report import figures
 from tirelib.report.accuracy import QUANTITIES, TITLE, Accuracy, accuracies
-from tirelib.report.page import DASH, Drawing, Section, Table, draw_all, number, write_page
+from tirelib.report.page import DASH, Drawing, Part, Table, draw_all, number, write_page
+from tirelib.report.style import AXES_NAME
 
 
 def write_estimate_report(
@@ -45,14 +46,14 @@ def write_estimate_report(
             )
         )
     sections = [
-        Section(
+        Part(
             "Accuracy",
             "accuracy",
             "" if rows else "The campaign holds no measured forces or slip to compare with.",
             [accuracy_table(rows)] if rows else [],
-            draw_all(folder, drawings),
+            pictures=draw_all(folder, drawings),
         ),
-        Section(
+        Part(
             "Validity",
             "validity",
             "A turn with faulty data, or outside the calibrated range, gets a flag and no valid "
@@ -62,13 +63,11 @@ def write_estimate_report(
     ]
     return write_page(
         folder,
-        "estimate.html",
+        "base.html",
         title=title or f"Estimates: {names}",
-        tire=calibration.tire,
-        campaigns=names,
-        gages=", ".join(number(1e3 * y, 3) for y in calibration.lateral),
-        turns=len(observations),
-        valid=int(estimates.turn_valid.sum()),
+        summary=f"Tire {calibration.tire}; campaigns {names}; {len(observations)} turns, "
+        f"{int(estimates.turn_valid.sum())} of them valid; calibrated gages at y = "
+        f"{', '.join(number(1e3 * y, 3) for y in calibration.lateral)} mm ({AXES_NAME}).",
         sections=sections,
     )
 

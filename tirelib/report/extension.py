@@ -8,8 +8,8 @@ from tirelib.report.error_sentences import error_line, fold_name
 from tirelib.report.explanation import said_strength
 from tirelib.report.figures.before_after import part_errors, run_errors
 from tirelib.report.figures.waterfall import waterfall_of
-from tirelib.report.page import Table, number, unit_name
-from tirelib.report.parts_page import Part, write_parts_page
+from tirelib.report.page import Part, Table, number, unit_name
+from tirelib.report.parts_page import write_parts_page
 
 
 def write_extension(told: Mapping[str, Any], folder: Path) -> tuple[Path, Path]:

@@ -13,8 +13,8 @@ import plotly.graph_objects as go
 from markupsafe import Markup
 
 from tirelib.report.figures.compare_plot import Plot, styled_figure
-from tirelib.report.page import DASH, Table, number
-from tirelib.report.parts_page import Part, write_parts_page
+from tirelib.report.page import DASH, Part, Table, number
+from tirelib.report.parts_page import write_parts_page
 from tirelib.report.style import BLUE, FAINT, ORANGE, RED
 
 MOST_ROWS = 200

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tirelib.report.page import DASH, Section, Table, filled, number
+from tirelib.report.page import DASH, Part, Table, filled, number
 
 REPORT_PAGES = {
     "calibrate": "index.html",
@@ -39,9 +39,9 @@ def container_page(
     began = container["start_dt"]
     when = "" if began is None else f", recorded {began:%Y-%m-%d %H:%M} UTC"
     sections = [
-        Section("Results", "results", tables=[_results(results)]),
-        Section("Channels", "channels", tables=[_channels(channels)] if channels else []),
-        Section(
+        Part("Results", "results", tables=[_results(results)]),
+        Part("Channels", "channels", tables=[_channels(channels)] if channels else []),
+        Part(
             "What the command said",
             "said",
             tables=[

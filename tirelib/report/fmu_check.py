@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from tirelib.report.page import Drawing, Section, Table, draw_all, number, write_page
+from tirelib.report.page import Drawing, Part, Table, draw_all, number, write_page
 from tirelib.report.style import BLUE, ORANGE, new_figure, styled
 
 Document = Mapping[str, Any]
@@ -58,13 +59,13 @@ def write_check(document: Document, folder: Path) -> Path:
         )
     pictures = draw_all(folder, drawings)
     sections = [
-        Section("What was tried", "parts", tables=[_parts(document)]),
-        Section("The FMU", "facts", tables=[_facts(document)]),
+        Part("What was tried", "parts", tables=[_parts(document)]),
+        Part("The FMU", "facts", tables=[_facts(document)]),
     ]
     if document["variables"]:
         sections.insert(
             1,
-            Section(
+            Part(
                 "Against the reference",
                 "reference",
                 tables=[_variables(document)],
@@ -74,14 +75,15 @@ def write_check(document: Document, folder: Path) -> Path:
     if document["messages"]:
         rows = [[message] for message in document["messages"]]
         sections.append(
-            Section("What the FMU logged", "log", tables=[Table("Log", ["message"], rows)])
+            Part("What the FMU logged", "log", tables=[Table("Log", ["message"], rows)])
         )
     return write_page(
         folder,
-        "fmu_check.html",
+        "base.html",
         title=f"Check of {name}",
-        verdict=verdict(document),
-        lead=f"File {document['file']}, {document['size'] / 1e3:.0f} kB.",
+        summary=Markup("<strong>{}</strong> File {}, {} kB.").format(
+            verdict(document), document["file"], f"{document['size'] / 1e3:.0f}"
+        ),
         sections=sections,
     )
 

@@ -13,8 +13,8 @@ from tirelib.report.figures.before_after import force_maps, maps, part_errors, r
 from tirelib.report.figures.compare_forces import force_curves
 from tirelib.report.figures.compare_waveforms import waveforms
 from tirelib.report.figures.waterfall import waterfall_of
-from tirelib.report.page import Table, number, unit_name
-from tirelib.report.parts_page import Part, write_parts_page
+from tirelib.report.page import Part, Table, number, unit_name
+from tirelib.report.parts_page import write_parts_page
 
 TITLE = "What the model lacked"
 

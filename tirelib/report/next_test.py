@@ -12,8 +12,8 @@ from tirelib.inference.planning.criterion import NOTHING, NextTest, PairForecast
 from tirelib.inference.planning.document import PROMISING, STRUCTURE, Plan, advice, plan_document
 from tirelib.inference.planning.envelope import AXES
 from tirelib.report.figures.compare_plot import Plot, styled_figure
-from tirelib.report.page import Table, number, numbers
-from tirelib.report.parts_page import Part, write_parts_page
+from tirelib.report.page import Part, Table, number, numbers
+from tirelib.report.parts_page import write_parts_page
 from tirelib.report.style import BLUE, FAINT, RED
 
 TITLE = "Which run to measure next"

@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
@@ -12,6 +12,9 @@ from matplotlib.figure import Figure
 from tirelib.core.errors import TirelibError
 from tirelib.core.version import __version__
 from tirelib.report.style import AXES_NAME, save
+
+if TYPE_CHECKING:
+    from tirelib.report.figures.compare_plot import Plot
 
 DASH = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
@@ -75,14 +78,16 @@ class Picture:
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
-    """A part of a page."""
+class Part:
+    """A part of a page; a plot is interactive, a picture is a file."""
 
     title: str
     anchor: str
     text: str = ""
     tables: Sequence[Table] = ()
-    pictures: Sequence[Picture] = field(default_factory=tuple)
+    plots: Sequence["Plot"] = ()
+    sources: Sequence[str] = ()
+    pictures: Sequence[Picture] = ()
 
 
 def number(value: float | None, digits: int = 4) -> str:
@@ -99,11 +104,8 @@ def number(value: float | None, digits: int = 4) -> str:
     if value == 0.0:
         return "0"
     if size < 1e-4 or size >= 1e7:
-        return (
-            f"{value:.{digits - 1}e}".replace("-", MINUS, 1)
-            if value < 0
-            else (f"{value:.{digits - 1}e}")
-        )
+        text = f"{value:.{digits - 1}e}"
+        return text.replace("-", MINUS, 1) if value < 0 else text
     decimals = max(0, digits - 1 - math.floor(math.log10(size)))
     text = f"{value:.{decimals}f}"
     if "." in text:
@@ -136,23 +138,13 @@ def draw_all(folder: Path, drawings: Sequence[Drawing]) -> list[Picture]:
     """Draw figures into a folder; one that the data cannot inform is kept with the reason."""
     pictures = []
     for drawing in drawings:
+        said = drawing.name, drawing.title, drawing.caption
         try:
-            figure = drawing.draw()
+            file = save(drawing.draw(), folder / "figures", drawing.name)
         except TirelibError as error:
-            pictures.append(
-                Picture(drawing.name, drawing.title, drawing.caption, reason=str(error))
-            )
-            continue
-        file = save(figure, folder / "figures", drawing.name)
-        pictures.append(
-            Picture(
-                drawing.name,
-                drawing.title,
-                drawing.caption,
-                file=f"figures/{file}",
-                vector=f"figures/{drawing.name}.svg",
-            )
-        )
+            pictures.append(Picture(*said, reason=str(error)))
+        else:
+            pictures.append(Picture(*said, f"figures/{file}", f"figures/{drawing.name}.svg"))
     return pictures
 
 
@@ -164,7 +156,7 @@ def filled(template: str | Path, **content: Any) -> str:
     template : str or Path
         The name of a template of this package, or the path of a template that extends one of them.
     **content
-        Values that the template names.
+        Values that the template names; those of base.html are title, summary and sections.
     """
     template = Path(template)
     environment = Environment(
@@ -176,9 +168,8 @@ def filled(template: str | Path, **content: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(template.name).render(
-        axes=AXES_NAME, version=__version__, **content
-    )
+    known = {"axes": AXES_NAME, "version": __version__, "summary": "", **content}
+    return environment.get_template(template.name).render(known)
 
 
 def write_page(folder: Path, template: str | Path, **content: Any) -> Path:

@@ -1,53 +1,13 @@
 """Pages made of parts: one self-contained HTML file, and the same in Markdown."""
 
-import base64
-import csv
-import io
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from tirelib.report.figures.compare_plot import Plot
-from tirelib.report.page import Table, filled
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """A part of the page."""
-
-    title: str
-    anchor: str
-    text: str = ""
-    tables: Sequence[Table] = ()
-    plots: Sequence[Plot] = ()
-    sources: Sequence[str] = field(default_factory=tuple)
-
-
-@dataclass(frozen=True, slots=True)
-class Shown:
-    """A plot as the template takes it."""
-
-    name: str
-    title: str
-    caption: str
-    height: int
-    json: str
-    csv: str
-
-    @classmethod
-    def of(cls, plot: Plot) -> "Shown":
-        """Return the plot with its data ready for the page."""
-        text = io.StringIO()
-        writer = csv.writer(text)
-        writer.writerow(plot.columns)
-        writer.writerows(plot.rows)
-        data = base64.b64encode(text.getvalue().encode()).decode()
-        height = int(plot.figure.layout.height)
-        return cls(plot.name, plot.title, plot.caption, height, str(plot.figure.to_json()), data)
+from tirelib.report.page import Part, Table, filled
 
 
 def write_parts_page(
@@ -92,27 +52,15 @@ def write_parts_page(
     OSError
         If the folder cannot be written.
     """
-    shown = {plot.name: Shown.of(plot) for part in parts for plot in part.plots}
-    figures = "{" + ",".join(f"{json.dumps(s.name)}:{s.json}" for s in shown.values()) + "}"
-    views = [
-        {
-            "title": part.title,
-            "anchor": part.anchor,
-            "text": part.text,
-            "tables": part.tables,
-            "plots": [shown[plot.name] for plot in part.plots],
-            "sources": part.sources,
-        }
-        for part in parts
-    ]
+    figures = {plot.name: plot.figure.to_json() for part in parts for plot in part.plots}
+    listed = ",".join(f"{json.dumps(name)}:{figure}" for name, figure in figures.items())
     folder.mkdir(parents=True, exist_ok=True)
     page, text = folder / f"{name}.html", folder / f"{words or name}.md"
     page.write_text(
         filled(
-            "comparison.html",
+            "page.html",
             title=title,
-            sections=(),
-            parts=views,
+            sections=parts,
             summary=summary,
             answer=answer,
             messages=messages,
@@ -122,7 +70,7 @@ def write_parts_page(
             links=links,
             commands=commands,
             plotly=Markup(get_plotlyjs()),
-            figures=Markup(figures.replace("</", "<\\/")),
+            figures=Markup("{" + listed.replace("</", "<\\/") + "}"),
         ),
         encoding="utf-8",
     )

@@ -1,5 +1,8 @@
 """Common parts of interactive figures: one look, and their data as a table."""
 
+import base64
+import csv
+import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -48,6 +51,18 @@ class Plot:
     figure: go.Figure
     columns: Sequence[str]
     rows: Sequence[Sequence[Any]]
+
+    @property
+    def height(self) -> int:
+        """Height on a page, in pixels."""
+        return int(self.figure.layout.height)
+
+    @property
+    def csv(self) -> str:
+        """The data as a CSV file, in base 64."""
+        text = io.StringIO()
+        csv.writer(text).writerows([self.columns, *self.rows])
+        return base64.b64encode(text.getvalue().encode()).decode()
 
     @classmethod
     def of(
