@@ -1,11 +1,13 @@
 """The page of a comparison: one self-contained HTML file; and the same in Markdown."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from tirelib.inference.compare.document import comparison_document
 from tirelib.inference.compare.force_curves import curves_of
-from tirelib.inference.compare.forces import UNITS as FORCE_UNITS
 from tirelib.inference.compare.forces import ForceComparison
 from tirelib.inference.compare.sentences import millimetres
 from tirelib.inference.compare.strain import Comparison
@@ -21,7 +23,7 @@ from tirelib.report.figures.compare_forces import curve_plots, force_plots, forc
 from tirelib.report.figures.compare_heat import gage_plots, heat_maps
 from tirelib.report.figures.compare_trends import set_point_plot, track_plots, trend_plots
 from tirelib.report.figures.compare_waveforms import waveform_plots
-from tirelib.report.page import Part, Table, number
+from tirelib.report.page import Part, Table, number, numbers, unit_name
 from tirelib.report.parts_page import write_parts_page
 
 SENTENCE_NOTE = (
@@ -49,66 +51,6 @@ BRUSH = (
 )
 
 
-def answer_of(found: Comparison | ForceComparison) -> str:
-    """Return the result as a sentence."""
-    verdict = found.verdict if isinstance(found, ForceComparison) else found.fit.verdict
-    error = found.error if isinstance(found, ForceComparison) else found.error.value
-    left = _left(found)
-    but = (
-        " Single gages, the contact or the deflection differ; see below." if found.sentences else ""
-    )
-    return {
-        "fits": f"The model fits: its error is {number(error, 3)} times the noise of the repeats; "
-        f"{left}." + but,
-        "lack_of_fit": "The model does not fit to within the noise: its error is "
-        f"{number(error, 3)} times the noise of the repeats; {left}.",
-        "does_not_fit": f"The model does not fit: {left}.",
-        "noise_unknown": f"The noise is unknown: {left}; whether that exceeds the noise is open.",
-    }[verdict]
-
-
-def _left(found: Comparison | ForceComparison) -> str:
-    if isinstance(found, ForceComparison):
-        unit = FORCE_UNITS[found.quantity]
-        return (
-            f"model and measurement differ by {number(found.rms, 3)} of "
-            f"{number(found.measured_rms, 4)} {unit} rms"
-        )
-    return (
-        f"model and measurement differ by {number(1e6 * found.error.rms, 3)} of "
-        f"{number(1e6 * found.fit.strain_rms, 4)} microstrain rms, errors of the set points "
-        "included"
-    )
-
-
-def floor_text(found: Comparison) -> str:
-    """Return a sentence on the structural floor."""
-    floor, parts = found.floor, []
-    if np.isfinite(floor.value):
-        parts.append(
-            f"Noise and the tire's structure explain an error of {number(floor.value, 3)} (the "
-            "floor, from the last entry of the model's history)."
-        )
-    else:
-        parts.append("The model's history states no floor for these data.")
-    if np.isfinite(floor.share):
-        parts.append(
-            f"A smooth misfit of angle, load and pressure explains {100 * floor.share:.0f} % of "
-            f"what exceeds the noise; without it the error would be {number(floor.smooth, 3)}."
-        )
-    return " ".join(parts)
-
-
-def force_floor_text(found: ForceComparison) -> str:
-    """Return a sentence on a force's floor."""
-    if np.isfinite(found.floor):
-        return (
-            f"Noise and the brush's structure explain an error of {number(found.floor, 3)} (the "
-            f"floor, from the last entry for {found.quantity} in the model's history)."
-        )
-    return f"The model's history states no floor for {found.quantity} on these data."
-
-
 def write_comparison(found: Comparison | ForceComparison, folder: Path) -> tuple[Path, Path]:
     """Write ``index.html`` and ``comparison.md``; return their paths.
 
@@ -117,39 +59,78 @@ def write_comparison(found: Comparison | ForceComparison, folder: Path) -> tuple
     OSError
         If the folder cannot be written.
     """
-    parts = force_parts(found) if isinstance(found, ForceComparison) else strain_parts(found)
+    told = comparison_document(found)
+    if isinstance(found, ForceComparison):
+        parts = force_parts(found)
+        summary = f"Campaign {found.name}, model {found.model}; {found.measured.size} points."
+    else:
+        parts, chosen = strain_parts(found), found.chosen
+        lateral = [millimetres(chosen.waves.header.gage_lateral[g]) for g in chosen.gages]
+        effects = ", ".join(u.effect.name for u in found.model.used) or "none"
+        summary = (
+            f"Campaign {told['campaign']}, model {told['model']}, effects: {effects}. "
+            f"{len(found.run)} runs, {int(chosen.straight.sum())} of them counted; mean over the "
+            f"gages at y = {', '.join(lateral)}."
+        )
     return write_parts_page(
         folder,
         "index",
         parts,
         words="comparison",
         title=f"Model against measurement: {found.quantity}",
-        summary=summary_of(found),
-        answer=answer_of(found),
+        summary=summary,
+        answer=_answer(told),
         messages=found.messages,
         sentences=found.sentences,
         sentence_note=SENTENCE_NOTE,
     )
 
 
-def summary_of(found: Comparison | ForceComparison) -> str:
-    """Return a sentence on the compared data."""
-    if isinstance(found, ForceComparison):
-        return f"Campaign {found.name}, model {found.model}; {found.measured.size} points."
-    chosen = found.chosen
-    lateral = ", ".join(millimetres(chosen.waves.header.gage_lateral[g]) for g in chosen.gages)
-    effects = ", ".join(u.effect.name for u in found.model.used) or "none"
+def _answer(told: Mapping[str, Any]) -> str:
+    """Return the result of a ``tirelib-comparison/1`` as a sentence."""
+    left = (
+        f"model and measurement differ by {number(told['residual_rms_raw'], 3)} of "
+        f"{number(told['measured_rms'], 4)} {unit_name(told['unit'])} rms"
+    )
+    if told["quantity"] == "strain":
+        left += ", errors of the set points included"
+    noise = f"its error is {number(told['error'], 3)} times the noise of the repeats; {left}."
+    if told["verdict"] == "fits" and told["statements"]:
+        noise += " Single gages, the contact or the deflection differ; see below."
+    return {
+        "fits": f"The model fits: {noise}",
+        "lack_of_fit": f"The model does not fit to within the noise: {noise}",
+        "does_not_fit": f"The model does not fit: {left}.",
+        "noise_unknown": f"The noise is unknown: {left}; whether that exceeds the noise is open.",
+    }[told["verdict"]]
+
+
+def _floor(told: Mapping[str, Any]) -> str:
+    """Return a sentence on the structural floor."""
+    strain = told["quantity"] == "strain"
+    entry = "last entry of" if strain else f"last entry for {told['quantity']} in"
+    text = f"The model's history states no floor for {told['quantity']} on these data."
+    if strain:
+        text = "The model's history states no floor for these data."
+    if np.isfinite(told["floor"]):
+        text = (
+            f"Noise and the {'tire' if strain else 'brush'}'s structure explain an error of "
+            f"{number(told['floor'], 3)} (the floor, from the {entry} the model's history)."
+        )
+    if told["smooth_share"] is None or np.isnan(told["smooth_share"]):
+        return text
     return (
-        f"Campaign {chosen.waves.header.name}, model {found.model.name}, effects: {effects}. "
-        f"{len(found.run)} runs, {int(chosen.straight.sum())} of them counted; mean over the gages "
-        f"at y = {lateral}."
+        f"{text} A smooth misfit of angle, load and pressure explains "
+        f"{100 * told['smooth_share']:.0f} % of what exceeds the noise; without it the error would "
+        f"be {number(told['smooth_floor'], 3)}."
     )
 
 
 def strain_parts(found: Comparison) -> list[Part]:
     """Return the parts of a page on strain."""
+    told = comparison_document(found)
     return [
-        Part("Noise, error, floor", "noise", floor_text(found), tables=[number_table(found)]),
+        Part("Noise, error, floor", "noise", _floor(told), tables=[number_table(told)]),
         Part(
             "Where: angle and condition",
             "maps",
@@ -174,11 +155,11 @@ def strain_parts(found: Comparison) -> list[Part]:
 
 def force_parts(found: ForceComparison) -> list[Part]:
     """Return the parts of a page on a force."""
-    curves = curves_of(found)
-    noise, table, listed = force_tables(found, curves)
+    curves, told = curves_of(found), comparison_document(found)
+    table, listed = force_tables(found, curves)
     effects = [f"{used.effect.name}: {used.effect.source}" for used in found.used]
     return [
-        Part("Noise, error, floor", "noise", force_floor_text(found), tables=[noise]),
+        Part("Noise, error, floor", "noise", _floor(told), tables=[number_table(told)]),
         Part("Where: slip and condition", "where", plots=force_plots(found)),
         Part(
             "Best, median and worst curve",
@@ -194,26 +175,22 @@ def force_parts(found: ForceComparison) -> list[Part]:
 
 
 def _provenance(found: Comparison) -> list[Table]:
-    rows = [[name, source] for name, source in found.model.sources.items()]
-    effects = [
-        [u.effect.name, u.effect.title, f"{_strength(u.strength)} {u.effect.unit}", u.effect.source]
-        for u in found.model.used
-    ]
-    out = [
-        Table("Parameters of the tire", ["number", "kind and source"], rows, texts=2, folded=True)
-    ]
-    if effects:
-        out.insert(
-            0,
-            Table(
-                "Effects in the model", ["effect", "what", "strength", "source"], effects, texts=4
-            ),
-        )
-    return out
-
-
-def _strength(value: float | tuple[float, ...]) -> str:
-    return ", ".join(number(x, 4) for x in (value if isinstance(value, tuple) else (value,)))
+    tire, used = found.model.sources.items(), found.model.used
+    parameters = Table(
+        "Parameters of the tire", ["number", "kind and source"], [*tire], texts=2, folded=True
+    )
+    effects = Table.of(
+        "Effects in the model",
+        used,
+        {
+            "effect": lambda u: u.effect.name,
+            "what": lambda u: u.effect.title,
+            "strength": lambda u: f"{numbers(u.components, 4)} {u.effect.unit}",
+            "source": lambda u: u.effect.source,
+        },
+        texts=4,
+    )
+    return [effects, parameters] if used else [parameters]
 
 
 def _bibliography(found: Comparison) -> list[str]:

@@ -1,5 +1,8 @@
 """The tables of a comparison's page."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from tirelib.inference.compare.force_curves import Curve
@@ -12,40 +15,39 @@ from tirelib.inference.compare.strain import Comparison
 from tirelib.inference.compare.track_words import track_fit
 from tirelib.report.figures.compare_heat import NAMES as CONDITIONS
 from tirelib.report.figures.compare_heat import unit_of
-from tirelib.report.page import Table, number
+from tirelib.report.page import Table, number, unit_name
 
 
-def number_table(found: Comparison) -> Table:
-    """Return noise, error and floor."""
-    fit, noise = found.fit, found.noise
-    rows = [
-        [
-            f"noise of a run's waveform, from {noise.repeats} repeated set points [microstrain]",
-            number(1e6 * noise.std, 3),
-        ],
-        [f"error [{found.error.unit}]", number(found.error.value, 4)],
-        [
-            "delay of the gages against the trigger, corrected for [microseconds]",
-            f"{number(1e6 * found.error.delay, 3)} \u00b1 {number(1e6 * found.error.delay_std, 2)}",
-        ],
-        [
-            "rms difference, corrected for set points and delay [noise]",
-            number(fit.rms / noise.std, 4),
-        ],
-        [
-            "rms difference, corrected for set points and delay [microstrain]",
-            number(1e6 * fit.rms, 4),
-        ],
-        [
-            "rms difference, corrected for the delay only [microstrain]",
-            number(1e6 * found.error.rms, 4),
-        ],
-        ["rms measured strain [microstrain]", number(1e6 * fit.strain_rms, 4)],
-        ["floor as far as known [noise]", number(found.floor.value, 4)],
-        ["error without a smooth misfit [noise]", number(found.floor.smooth, 4)],
-    ]
-    note = "The error is that of the straight, freely rolling runs." if found.error.known else ""
-    return Table("Noise, error and floor", ["", "value"], rows, note=note)
+def number_table(told: Mapping[str, Any]) -> Table:
+    """Return noise, error and floor of a ``tirelib-comparison/1``."""
+    unit, repeats = unit_name(told["unit"]), told["repeats"]
+    error = {f"error [{told['error_unit']}]": number(told["error"], 4)}
+    floor = {"floor as far as known [noise]": number(told["floor"], 4)}
+    measured = number(told["measured_rms"], 4)
+    if told["quantity"] != "strain":
+        noise = f"noise of a point, from {repeats} repeated conditions [{unit}]"
+        left = {f"rms difference [{unit}]": number(told["residual_rms"], 4)}
+        rows = {noise: number(told["noise"], 3)} | error | floor | left
+        return Table.listed("Noise and error", rows | {f"rms measured [{unit}]": measured})
+    rest, delay = "rms difference, corrected for set points and delay", "corrected for the delay"
+    rows = {
+        f"noise of a run's waveform, from {repeats} repeated set points [{unit}]": number(
+            told["noise"], 3
+        ),
+        **error,
+        "delay of the gages against the trigger, corrected for [microseconds]": (
+            f"{number(told['delay_us'], 3)} \u00b1 {number(told['delay_std_us'], 2)}"
+        ),
+        f"{rest} [noise]": number(told["residual_rms_noise"], 4),
+        f"{rest} [{unit}]": number(told["residual_rms"], 4),
+        f"rms difference, {delay} only [{unit}]": number(told["residual_rms_raw"], 4),
+        f"rms measured strain [{unit}]": measured,
+        **floor,
+        "error without a smooth misfit [noise]": number(told["smooth_floor"], 4),
+    }
+    known = told["error_unit"] == "noise"
+    note = "The error is that of the straight, freely rolling runs." if known else ""
+    return Table.listed("Noise, error and floor", rows, note)
 
 
 def sector_tables(found: Comparison) -> list[Table]:
@@ -137,10 +139,9 @@ def track_table(found: Comparison) -> Table:
 def point_table(found: Comparison) -> Table:
     """Return the table of estimated set-point errors."""
     scaled, tolerance = found.points.scaled, found.points.tolerance
-    units = (("%", 100.0),) * 3 + (("mrad", 1e3),)
     rows = []
     for k, name in enumerate(NAMES):
-        unit, factor = units[k]
+        unit, factor = ("mrad", 1e3) if name == "angle" else ("%", 100.0)
         worst = int(np.argmax(np.abs(scaled[:, k])))
         rows.append(
             [
@@ -161,23 +162,9 @@ def point_table(found: Comparison) -> Table:
     )
 
 
-def force_tables(found: ForceComparison, curves: tuple[Curve, ...]) -> tuple[Table, Table, Table]:
-    """Return a force's noise and error, its differences by condition, and its curves."""
+def force_tables(found: ForceComparison, curves: tuple[Curve, ...]) -> tuple[Table, Table]:
+    """Return a force's differences by condition, and its curves."""
     unit = FORCE_UNITS[found.quantity]
-    noise = Table(
-        "Noise and error",
-        ["", "value"],
-        [
-            [
-                f"noise of a point, from {found.repeats} repeated conditions [{unit}]",
-                number(found.noise, 3),
-            ],
-            [f"error [{found.error_unit}]", number(found.error, 4)],
-            ["floor as far as known [noise]", number(found.floor, 4)],
-            [f"rms difference [{unit}]", number(found.rms, 4)],
-            [f"rms measured [{unit}]", number(found.measured_rms, 4)],
-        ],
-    )
     table = Table.of(
         "Difference, model minus measurement (slips by magnitude)",
         found.table,
@@ -204,4 +191,4 @@ def force_tables(found: ForceComparison, curves: tuple[Curve, ...]) -> tuple[Tab
         },
         folded=len(curves) > 8,
     )
-    return noise, table, listed
+    return table, listed

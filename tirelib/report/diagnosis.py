@@ -147,8 +147,7 @@ def _candidates(told: Mapping[str, Any]) -> Table:
 def _scores(told: Mapping[str, Any]) -> Plot:
     """Return the scores over their thresholds."""
     candidates = told["candidates"]
-    marks = [mark_of(told, entry) for entry in candidates]
-    names = [entry["effect"] for entry in candidates]
+    names, marks = [e["effect"] for e in candidates], [mark_of(told, e) for e in candidates]
     ratio = [entry["score"] / entry["threshold"] for entry in candidates]
     figure = go.Figure(
         go.Bar(
@@ -162,22 +161,16 @@ def _scores(told: Mapping[str, Any]) -> Plot:
     )
     figure.add_vline(x=1.0, line={"dash": "dot", "color": FAINT})
     # the place of an annotation on an axis of powers is a power
-    figure.add_annotation(
-        x=0.0, y=1.0, yref="paper", yanchor="bottom", text="threshold", showarrow=False
-    )
+    place = {"x": 0.0, "y": 1.0, "yref": "paper", "yanchor": "bottom"}
+    figure.add_annotation(**place, text="threshold", showarrow=False)
     figure.update_yaxes(autorange="reversed")
     figure.update_xaxes(title="score / threshold", type="log")
-    styled_figure(figure, 160 + 22 * len(names), showlegend=False)
-    return Plot(
+    return Plot.of(
         "scores",
         "Score over threshold",
         _caption(told, marks, ratio),
-        figure,
-        ["effect", "score / threshold", "level"],
-        [
-            [entry["effect"], each, mark]
-            for entry, each, mark in zip(candidates, ratio, marks, strict=True)
-        ],
+        styled_figure(figure, 160 + 22 * len(names), showlegend=False),
+        {"effect": names, "score / threshold": ratio, "level": marks},
     )
 
 
@@ -196,36 +189,29 @@ def _caption(told: Mapping[str, Any], marks: Sequence[str], ratio: Sequence[floa
 
 def _errors(told: Mapping[str, Any]) -> Table:
     unit, raw = unit_name(told["error_unit"]), unit_name(told["residual_rms_unit"])
-    rows = [
-        [f"noise, from {told['repeats']} repeats [{raw}]", number(told["noise"], 3)],
-        [f"error of the given model [{unit}]", number(told["error_before"], 4)],
-        [f"error with its parameters fitted again [{unit}]", number(told["error_refitted"], 4)],
-        [f"error with the named effects [{unit}]", number(told["error_after"], 4)],
-        [
-            f"floor: the error that noise and what plain tires show explain [{unit}]",
-            number(told["floor"], 4),
-        ],
-        [
-            "unweighted rms of model minus measurement, as given and with the named effects "
-            f"[{raw}]",
-            f"{number(told['residual_rms_before'], 4)}; {number(told['residual_rms_after'], 4)}",
-        ],
-        [
-            "largest standard score beside the verdict's model, and the score that plain tires "
-            "exceed with the false-alarm probability",
-            f"{number(told['misfit'], 3)} ({stands(told['misfit_of'])}); "
-            f"{number(told['misfit_floor'], 3)}",
-        ],
-        *(
-            [
-                f"left out of the fit: {fold_name(fold)}, error there without and with the named "
-                f"effects [{unit}]",
-                f"{number(fold['error_before'], 3)}; {number(fold['error_after'], 3)}",
-            ]
-            for fold in told["held_out"]
+    rows = {
+        f"noise, from {told['repeats']} repeats [{raw}]": number(told["noise"], 3),
+        f"error of the given model [{unit}]": number(told["error_before"], 4),
+        f"error with its parameters fitted again [{unit}]": number(told["error_refitted"], 4),
+        f"error with the named effects [{unit}]": number(told["error_after"], 4),
+        f"floor: the error that noise and what plain tires show explain [{unit}]": number(
+            told["floor"], 4
         ),
-    ]
-    return Table("Errors", ["", "value"], rows)
+        "unweighted rms of model minus measurement, as given and with the named effects "
+        f"[{raw}]": _pair(told, "residual_rms_before", "residual_rms_after", 4),
+        "largest standard score beside the verdict's model, and the score that plain tires "
+        "exceed with the false-alarm probability": f"{number(told['misfit'], 3)} "
+        f"({stands(told['misfit_of'])}); {number(told['misfit_floor'], 3)}",
+    } | {
+        f"left out of the fit: {fold_name(fold)}, error there without and with the named "
+        f"effects [{unit}]": _pair(fold, "error_before", "error_after", 3)
+        for fold in told["held_out"]
+    }
+    return Table.listed("Errors", rows)
+
+
+def _pair(told: Mapping[str, Any], first: str, second: str, digits: int) -> str:
+    return f"{number(told[first], digits)}; {number(told[second], digits)}"
 
 
 def _falls(told: Mapping[str, Any], history: Sequence[Mapping[str, Any]]) -> list[Plot]:

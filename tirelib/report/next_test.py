@@ -11,7 +11,7 @@ from tirelib.core.quantities import QUANTITIES
 from tirelib.inference.planning.criterion import NOTHING, NextTest, PairForecast
 from tirelib.inference.planning.document import PROMISING, STRUCTURE, Plan, advice, plan_document
 from tirelib.inference.planning.envelope import AXES
-from tirelib.report.figures.compare_plot import Plot, styled_figure
+from tirelib.report.figures.compare_plot import Plot, dots, line, styled_figure
 from tirelib.report.page import Part, Table, number, numbers
 from tirelib.report.parts_page import write_parts_page
 from tirelib.report.style import BLUE, FAINT, RED
@@ -94,40 +94,27 @@ def _said(pair: PairForecast) -> str:
 
 
 def _runs(test: NextTest) -> Table:
-    rows = []
     names, swept = test.envelope.names, [test.envelope.slips] if test.envelope.sweep else []
-    for k in range(min(SHOWN, len(test.points))):
-        rows.append(
-            [
-                str(k + 1),
-                *_told(test, test.points[k]),
-                *swept,
-                number(test.score[k], 3),
-                number(float(test.std[k]), 2),
-                number(100.0 * test.probability[k], 2),
-                _said(test.pairs[test.hardest[k]]),
-            ]
-        )
-    median = [
-        "any run",
-        *[""] * (len(names) + len(swept)),
-        number(float(np.median(test.score)), 3),
-        "",
-        number(100.0 * float(np.mean(test.probability)), 2),
-        "",
+    rows = [
+        [
+            str(k + 1),
+            *_told(test, test.points[k]),
+            *swept,
+            number(test.score[k], 3),
+            number(float(test.std[k]), 2),
+            number(100.0 * test.probability[k], 2),
+            _said(test.pairs[test.hardest[k]]),
+        ]
+        for k in range(min(SHOWN, len(test.points)))
     ]
+    score, chance = float(np.median(test.score)), 100.0 * float(np.mean(test.probability))
+    blank = [""] * (len(names) + len(swept))
+    headings = [QUANTITIES[name].heading for name in names] + ["sweep"] * len(swept)
+    results = ["separation [chi-square]", "std", "chance to resolve [%]", "hardest pair"]
     return Table(
         "Possible runs",
-        [
-            "rank",
-            *[QUANTITIES[name].heading for name in names],
-            *["sweep"] * len(swept),
-            "separation [chi-square]",
-            "std",
-            "chance to resolve [%]",
-            "hardest pair",
-        ],
-        [*rows, median],
+        ["rank", *headings, *results],
+        [*rows, ["any run", *blank, number(score, 3), "", number(chance, 2), ""]],
         note="Separation of the pair that this run separates least; the chance is a mean over the "
         "undecided pairs. Last row: median separation and mean chance over all possible runs.",
     )
@@ -182,70 +169,48 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
     names, best = test.envelope.names, test.points[0]
     others = [k for k in range(len(names)) if k not in (x, y, panel)]
     shown = np.flatnonzero((test.points[:, others] == best[others]).all(axis=1))
-    height = test.points[:, y] if y is not None else np.zeros(len(test.points))
-    xs, ys = np.unique(test.points[shown, x]), np.unique(height[shown])
-    panels = np.unique(test.points[shown, panel]) if panel is not None else np.zeros(1)
-    of_panel = test.points[:, panel] if panel is not None else np.zeros(len(test.points))
-    top = max(float(pair.separation[shown].max()), 1.0)
-    across = np.round(QUANTITIES[names[x]].told(xs), 2)
-    upward = np.round(_upward(test, y, ys), 2)
-    hover = _hover(names[x], names[y] if y is not None else None)
-    pressure = QUANTITIES["pressure"]
+    across, up, pressure = (None if k is None else QUANTITIES[names[k]] for k in (x, y, panel))
+    assert across is not None  # noqa: S101 - every map is over a condition
+    points = np.zeros((len(test.points), 3))
+    for column, (k, said) in enumerate(zip((x, y, panel), (across, up, pressure), strict=True)):
+        if k is not None and said is not None:
+            points[:, column] = said.told(test.points[:, k])
+    xs, ys, panels = (np.unique(points[shown, column]) for column in range(3))
     figure = make_subplots(
         cols=len(panels),
         shared_yaxes=True,
         horizontal_spacing=0.03,
-        subplot_titles=[f"{pressure.told(p):.3g} {pressure.unit}" for p in panels]
-        if panel
-        else None,
+        subplot_titles=[f"{p:.3g} {pressure.unit}" for p in panels] if pressure else None,
     )
+    upward = "" if up is None else f", %{{y}} {up.unit}"
+    hover = f"%{{x}} {across.unit}{upward}: separation %{{z:.3g}}, chance %{{customdata}} %"
     for column, level in enumerate(panels, start=1):
-        grid = np.full((len(ys), len(xs)), np.nan)
-        chance = grid.copy()
-        for k in shown[of_panel[shown] == level]:
-            at = np.searchsorted(ys, height[k]), np.searchsorted(xs, test.points[k, x])
+        grid, chance = np.full((2, len(ys), len(xs)), np.nan)
+        for k in shown[points[shown, 2] == level]:
+            at = np.searchsorted(ys, points[k, 1]), np.searchsorted(xs, points[k, 0])
             grid[at], chance[at] = pair.separation[k], 100.0 * pair.probability[k]
-        figure.add_trace(
-            go.Heatmap(
-                z=np.round(grid, 3),
-                x=across,
-                y=upward,
-                customdata=np.round(chance),
-                coloraxis="coloraxis",
-                hovertemplate=hover,
-                texttemplate="%{z:.2~r}",
-                textfont={"size": 11},
-            ),
-            row=1,
-            col=column,
+        field = go.Heatmap(
+            z=np.round(grid, 3),
+            x=np.round(xs, 2),
+            y=np.round(ys, 2),
+            customdata=np.round(chance),
+            coloraxis="coloraxis",
+            hovertemplate=f"{hover}<extra></extra>",
+            texttemplate="%{z:.2~r}",
+            textfont={"size": 11},
         )
-    at_best = QUANTITIES[names[x]].told(best[x]), float(_upward(test, y, height[0]))
-    figure.add_trace(
-        go.Scatter(
-            x=[at_best[0]],
-            y=[at_best[1]],
-            mode="markers",
-            showlegend=False,
-            marker={"symbol": "circle-open", "size": 30, "color": RED, "line": {"width": 3}},
-            hovertemplate="advised<extra></extra>",
-        ),
-        row=1,
-        col=int(np.searchsorted(panels, of_panel[0])) + 1,
-    )
-    figure.update_xaxes(title=QUANTITIES[names[x]].heading)
-    figure.update_yaxes(title=QUANTITIES[names[y]].heading if y is not None else "", col=1)
+        figure.add_trace(field, row=1, col=column)
+    ring = {"symbol": "circle-open", "line": {"width": 3}}
+    advised = dots([points[0, 0]], [points[0, 1]], "advised", RED, 30, **ring)
+    place = {"row": 1, "col": int(np.searchsorted(panels, points[0, 2])) + 1}
+    figure.add_scatter(**advised, showlegend=False, hovertemplate="advised<extra></extra>", **place)
+    figure.update_xaxes(title=across.heading)
+    figure.update_yaxes(title="" if up is None else up.heading, col=1)
     if len(ys) == 1:
-        figure.update_yaxes(tickvals=list(upward) if y is not None else [])
-    styled_figure(
-        figure,
-        420,
-        coloraxis={
-            "colorscale": "Viridis",
-            "cmin": 0.0,
-            "cmax": top,
-            "colorbar": {"title": {"text": "separation"}},
-        },
-    )
+        figure.update_yaxes(tickvals=[] if up is None else list(np.round(ys, 2)))
+    top = max(float(pair.separation[shown].max()), 1.0)
+    bar = {"title": {"text": "separation"}}
+    scale = {"colorscale": "Viridis", "cmin": 0.0, "cmax": top, "colorbar": bar}
     note = (
         "Chi-square that one run is expected to add against the wrong suspect. The ring marks the "
         "advised run; blank fields are beyond the tire's validity."
@@ -256,22 +221,9 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
         f"separation-{'-'.join(pair.names)}",
         f"Separation of {_said(pair)}",
         note,
-        figure,
+        styled_figure(figure, 420, coloraxis=scale),
         [*[QUANTITIES[name].heading for name in names], "separation", "chance to resolve"],
         [_row(test, pair, k) for k in range(len(test.points))],
-    )
-
-
-def _upward(test: NextTest, y: int | None, values: FloatArray) -> FloatArray:
-    """Return a map's upward values in their unit."""
-    return np.asarray(values if y is None else QUANTITIES[test.envelope.names[y]].told(values))
-
-
-def _hover(x: str, y: str | None) -> str:
-    upward = "" if y is None else f", %{{y}} {QUANTITIES[y].unit}"
-    return (
-        f"%{{x}} {QUANTITIES[x].unit}{upward}: separation %{{z:.3g}}, chance "
-        "%{customdata} %<extra></extra>"
     )
 
 
@@ -316,36 +268,23 @@ def _repeats(plan: Plan, test: NextTest, pairs: tuple[PairForecast, ...]) -> Plo
     figure = go.Figure()
     rows = []
     for pair in pairs:
-        times, reached = list(pair.repeats), list(pair.repeats.values())
-        figure.add_trace(
-            go.Scatter(x=times, y=np.round(reached, 3), mode="lines+markers", name=_said(pair))
-        )
-        figure.add_trace(
-            go.Scatter(
-                x=[1, times[-1]],
-                y=[pair.limit] * 2,
-                mode="lines",
-                hoverinfo="skip",
-                line={"dash": "dot", "color": FAINT},
-                name=f"limit, {_said(pair)}",
-            )
-        )
-        rows += [[_said(pair), n, float(f"{x:.5g}")] for n, x in pair.repeats.items()]
-    figure.add_hline(
-        y=plan.wanted,
-        line={"dash": "dash", "color": BLUE},
-        annotation_text="wanted",
-        annotation_position="top left",
-    )
+        said, times = _said(pair), list(pair.repeats)
+        reached = np.round(list(pair.repeats.values()), 3)
+        figure.add_scatter(x=times, y=reached, mode="lines+markers", name=said)
+        ends, limit = [1, times[-1]], [pair.limit] * 2
+        dotted = line(ends, limit, f"limit, {said}", FAINT, dash="dot")
+        figure.add_scatter(**dotted, hoverinfo="skip")
+        rows += [[said, n, float(f"{x:.5g}")] for n, x in pair.repeats.items()]
+    wanted = {"annotation_text": "wanted", "annotation_position": "top left"}
+    figure.add_hline(y=plan.wanted, line={"dash": "dash", "color": BLUE}, **wanted)
     figure.update_xaxes(title="repeats of the advised run", rangemode="tozero")
     figure.update_yaxes(title="separation", rangemode="tozero")
-    styled_figure(figure, 380, showlegend=True)
     return Plot(
         "repeats",
         "What repeats of the advised run add",
         f"Dotted: the limit that no number of repeats exceeds, because {STRUCTURE} does not "
         "average out.",
-        figure,
+        styled_figure(figure, 380, showlegend=True),
         ["pair", "repeats", "separation"],
         rows,
     )

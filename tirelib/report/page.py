@@ -54,6 +54,11 @@ class Table:
         rows = [[cell(item) for cell in columns.values()] for item in items]
         return cls(title, list(columns), rows, texts, note, folded)
 
+    @classmethod
+    def listed(cls, title: str, values: Mapping[str, str], note: str = "") -> "Table":
+        """Return a table of one value each, by what it is."""
+        return cls(title, ["", "value"], [[*row] for row in values.items()], note=note)
+
 
 @dataclass(frozen=True, slots=True)
 class Drawing:

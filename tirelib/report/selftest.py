@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import plotly.graph_objects as go
 
 from tirelib.report.diagnosis import dead_effects
@@ -78,17 +77,14 @@ def parts_of(document: Mapping[str, Any]) -> list[Part]:
 def _map(document: Mapping[str, Any]) -> Plot:
     names = [entry["effect"] for entry in document["effects"]]
     ratios = [f"{ratio:g}" for ratio in document["ratios"]]
-    chance = np.full((len(names), len(ratios)), np.nan)
-    words = [[""] * len(ratios) for _ in names]
-    rows = []
-    for i, entry in enumerate(document["effects"]):
-        for j, result in enumerate(entry["results"]):
-            if result["n"]:
-                chance[i, j] = 100.0 * result["found"]
-                words[i][j] = f"{chance[i, j]:.0f} %"
-            else:
-                words[i][j] = "beyond range"
-            rows.append([entry["effect"], *(result[key] for key in _KEYS)])
+    results = [entry["results"] for entry in document["effects"]]
+    chance = [[100.0 * each["found"] if each["n"] else None for each in row] for row in results]
+    words = [["beyond range" if x is None else f"{x:.0f} %" for x in row] for row in chance]
+    rows = [
+        [name, *(each[key] for key in _KEYS)]
+        for name, row in zip(names, results, strict=True)
+        for each in row
+    ]
     figure = go.Figure(
         go.Heatmap(
             z=chance,

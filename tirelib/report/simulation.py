@@ -6,7 +6,7 @@ tension.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,8 @@ CONTACTS = ("radial", "shear")
 N_SHEAR_NODES = 80
 N_ANGLES = 1441
 """A quarter of a degree."""
+PHI = np.linspace(-np.pi, np.pi, N_ANGLES)
+"""Angles of the curves, [rad]."""
 LARGEST_BELT_SPEED = 150.0
 """Turn rate times ring radius up to which a tire is rolled, [m/s], 540 km/h: tires are rated to 300
 km/h and, as (Y), beyond (UN Regulation 30). Half would refuse the symbols W and Y, double would let
@@ -277,42 +279,44 @@ def _check_tread(tire: Tire, load: FloatArray, compression: FloatArray) -> None:
 
 def _radial(tire: Tire, found: RadialContact, p: FloatArray, omega: FloatArray) -> Simulation:
     """Evaluate a radial contact on the grid of angles."""
-    phi = np.linspace(-np.pi, np.pi, N_ANGLES)
-    q = found.pressure_at(phi)
+    q = found.pressure_at(PHI)
     middle = found.pressure_at(found.edges.mean(axis=1)[:, None])[:, 0]
-    u, v, strain, rate, peaks = _shape(tire, found.displacement, found.edges)
-    return Simulation(
-        tire,
-        "radial",
-        p,
-        omega,
-        found.load,
-        found.deflection,
-        found.edges,
-        middle,
-        found.pressure_centre,
-        phi,
-        u,
-        v,
-        q,
-        q * np.cos(phi),
-        -q * np.sin(phi),
-        strain,
-        rate,
-        fine_peaks=peaks,
-    )
+    tractions = middle, q, q * np.cos(PHI), -q * np.sin(PHI)
+    return _simulation(tire, found, p, omega, tractions, found.displacement)
 
 
 def _sheared(tire: Tire, found: ShearContact, p: FloatArray, omega: FloatArray) -> Simulation:
     """Evaluate a contact with tread shear on the grid of angles."""
-    phi = np.linspace(-np.pi, np.pi, N_ANGLES)
-    q, normal, along = _tractions(found, phi)
     middle = _tractions(found, found.edges.mean(axis=1)[:, None])[0][:, 0]
     ring = compliance(Ring.of(tire, p, found.deflection), omega, N_SERIES)
-    u, v, strain, rate, peaks = _shape(tire, long_series(found, ring, N_ANGLES), found.edges)
+    belt = long_series(found, ring, N_ANGLES)
+    done = _simulation(tire, found, p, omega, (middle, *_tractions(found, PHI)), belt)
+    return replace(
+        done,
+        effective_radius=found.effective_radius,
+        torque=found.torque,
+        sliding_onset=found.sliding_onset,
+    )
+
+
+def _simulation(
+    tire: Tire,
+    found: RadialContact | ShearContact,
+    p: FloatArray,
+    omega: FloatArray,
+    tractions: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    displacement: ComplexArray,
+) -> Simulation:
+    """Return curves from tractions (pressure in the middle, pressure, normal, shear) and belt."""
+    middle, pressure, normal, along = tractions
+    wave = strain_harmonics(displacement, tire.ring_radius, tire.innerliner_offset)
+    slope = wave * 1j * np.arange(wave.shape[-1])
+    waves = (displacement[..., 0], displacement[..., 1], wave, slope)
+    fine = [on_grid(x, FINE_ANGLES_PER_ANGLE * (N_ANGLES - 1)) for x in waves]
+    u, v, strain, rate = (x[:, ::FINE_ANGLES_PER_ANGLE].copy() for x in fine)
     return Simulation(
         tire,
-        "shear",
+        "radial" if isinstance(found, RadialContact) else "shear",
         p,
         omega,
         found.load,
@@ -320,18 +324,15 @@ def _sheared(tire: Tire, found: ShearContact, p: FloatArray, omega: FloatArray) 
         found.edges,
         middle,
         found.pressure_centre,
-        phi,
+        PHI,
         u,
         v,
-        q,
+        pressure,
         normal,
         along,
         strain,
         rate,
-        found.effective_radius,
-        found.torque,
-        found.sliding_onset,
-        peaks,
+        fine_peaks=find_peaks(fine_grid(N_ANGLES), fine[2], fine[3], found.edges),
     )
 
 
@@ -345,20 +346,3 @@ def _tractions(found: ShearContact, phi: FloatArray) -> tuple[FloatArray, FloatA
         np.where(inside, along * sin - outward * cos, 0.0),
         np.where(inside, along * cos + outward * sin, 0.0),
     )
-
-
-def _shape(
-    tire: Tire, displacement: ComplexArray, edges: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, Peaks]:
-    """Return u, v, strain and strain rate at the angles, and the peaks between them."""
-    wave = strain_harmonics(displacement, tire.ring_radius, tire.innerliner_offset)
-    slope = wave * 1j * np.arange(wave.shape[-1])
-    waves = (displacement[..., 0], displacement[..., 1], wave, slope)
-    u, v, strain_fine, rate_fine = (
-        on_grid(x, FINE_ANGLES_PER_ANGLE * (N_ANGLES - 1)) for x in waves
-    )
-    peaks = find_peaks(fine_grid(N_ANGLES), strain_fine, rate_fine, edges)
-    u, v, strain, rate = (
-        x[:, ::FINE_ANGLES_PER_ANGLE].copy() for x in (u, v, strain_fine, rate_fine)
-    )
-    return u, v, strain, rate, peaks

@@ -5,7 +5,7 @@ the linear one (`tirelib.model.solution`); the shear is that of the rolling ring
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,15 +19,9 @@ from tirelib.measured.signal import LowPass
 from tirelib.model.base import predict
 from tirelib.model.solution import Solution, solved
 from tirelib.physics.ring.ring import ComplexArray
-from tirelib.report.simulation import (
-    N_ANGLES,
-    Simulation,
-    check_range,
-    check_turn_rate,
-    points_of,
-)
+from tirelib.report.simulation import PHI, Simulation, check_range, check_turn_rate, points_of
 
-TURN = np.linspace(-np.pi, np.pi, N_ANGLES - 1, endpoint=False)
+TURN = PHI[:-1]
 """Angles of the curves, the last of which is the first; every fourth is one of `GRID`."""
 TRIAL = 0.02
 """Relative step of the load by which the slope of the deflection is found."""
@@ -35,6 +29,7 @@ DEFLECTION_SETTLED, MOST_SOLVES = 1e-8, 30
 """Difference from the deflection that was asked for [m], and the solves until then."""
 
 
+@one_thread()
 def simulate_file(
     model: TireModel,
     tire: Tire,
@@ -46,85 +41,6 @@ def simulate_file(
     camber: FloatArray | None = None,
     temperature: FloatArray | None = None,
 ) -> Simulation:
-    """Simulate a model at one or many operating points; a scalar condition holds for all of them.
-
-    Parameters
-    ----------
-    model, tire
-        As of `simulate_model`.
-    load, deflection : shape (n_points,), [N], [m]
-        One of the two.
-    inflation, turn_rate, camber, temperature : shape (n_points,), [Pa], [rad/s], [rad], [K]
-        By default the tire's own, 0, 0 and unknown.
-
-    Raises
-    ------
-    ParameterError
-        If numbers of points differ or a value is outside the model's range; see `simulate_model`.
-    ConvergenceError
-        From `simulate_model`.
-    """
-    pressed = load if load is not None else deflection
-    target, p, omega, lean, warm = points_of(
-        pressed,
-        tire.pressure if inflation is None else inflation,
-        0.0 if turn_rate is None else turn_rate,
-        0.0 if camber is None else camber,
-        np.nan if temperature is None else temperature,
-    )
-    check_range("inflation pressure", p, FIELDS["pressure"].highest, "bar", "pressure")
-    check_turn_rate(tire, omega)
-    conditions = RollingConditions(p, omega, lean, warm)
-    if load is not None:
-        return simulate_model(model, tire, conditions, load=target)
-    return simulate_model(model, tire, conditions, deflection=target)
-
-
-@dataclass(frozen=True, slots=True)
-class RollingConditions:
-    """Operating points; arrays of shape (n_points,), SI.
-
-    Attributes
-    ----------
-    inflation, turn_rate : [Pa], [rad/s]
-    camber : [rad]
-    temperature : [K]
-        Temperature of the tread; NaN where unknown.
-    """
-
-    inflation: FloatArray
-    turn_rate: FloatArray
-    camber: FloatArray
-    temperature: FloatArray
-
-    def at(self, load: FloatArray, ring_radius: float) -> Operating:
-        """Return free rolling at loads, in the order of the points."""
-        none, n = np.zeros(load.size), load.size
-        return Operating(
-            load=load,
-            pressure=self.inflation,
-            omega=self.turn_rate,
-            speed=self.turn_rate * ring_radius,
-            camber=self.camber,
-            slip_angle=none,
-            slip_ratio=none,
-            side_force=none,
-            drive_force=none,
-            order=np.arange(n) / max(n - 1, 1),
-            temperature=self.temperature,
-        )
-
-
-@one_thread()
-def simulate_model(
-    model: TireModel,
-    tire: Tire,
-    conditions: RollingConditions,
-    *,
-    load: FloatArray | None = None,
-    deflection: FloatArray | None = None,
-    low_pass: LowPass | None = None,
-) -> Simulation:
     """Press a model with its effects onto the road, at one or many operating points.
 
     Parameters
@@ -132,34 +48,54 @@ def simulate_model(
     model : TireModel
     tire : Tire
         The model's, with the damping that is to be simulated.
-    conditions : RollingConditions
     load, deflection : shape (n_points,), [N], [m]
         One of the two.
-    low_pass : LowPass, optional
-        Low-pass filter of the gage's waveform; the default is that of the signal chain.
+    inflation, turn_rate, camber, temperature : shape (n_points,), [Pa], [rad/s], [rad], [K]
+        By default the tire's own, 0, 0 and unknown; a scalar holds for all points.
 
     Raises
     ------
     ParameterError
-        If an effect needs a condition that is unknown.
+        If numbers of points differ, a value is outside the model's range, or an effect needs a
+        condition that is unknown.
     ConvergenceError
         If the contact does not settle, or no load gives the deflection.
     """
+    target, p, omega, lean, warm = points_of(
+        load if load is not None else deflection,
+        tire.pressure if inflation is None else inflation,
+        0.0 if turn_rate is None else turn_rate,
+        0.0 if camber is None else camber,
+        np.nan if temperature is None else temperature,
+    )
+    check_range("inflation pressure", p, FIELDS["pressure"].highest, "bar", "pressure")
+    check_turn_rate(tire, omega)
+    _check_known(model, warm)
     values = {**model.values, "damping": tire.damping}
-    low_pass = low_pass or LowPass()
-    _check_known(model, conditions)
+    none, n = np.zeros(target.size), target.size
+    points = Operating(
+        load=target,
+        pressure=p,
+        omega=omega,
+        speed=omega * tire.ring_radius,
+        camber=lean,
+        slip_angle=none,
+        slip_ratio=none,
+        side_force=none,
+        drive_force=none,
+        order=np.arange(n) / max(n - 1, 1),
+        temperature=warm,
+    )
     if load is None:
-        assert deflection is not None  # noqa: S101 - the caller has looked
-        load = _load_at(model, values, conditions, deflection, low_pass, tire)
-    points = conditions.at(load, tire.ring_radius)
-    found = _pressed(model, values, points, low_pass)
+        points = _at_deflection(model, values, points, target)
+    found = _pressed(model, values, points)
     curves = _of_rolling(found) if isinstance(found, Solution) else _of_linear(found)
     return _simulation(tire, curves, found.deflection, points)
 
 
-def _check_known(model: TireModel, conditions: RollingConditions) -> None:
+def _check_known(model: TireModel, temperature: FloatArray) -> None:
     wants = [u.effect.name for u in model.used if u.effect.varies_with == ("temperature",)]
-    if wants and not np.isfinite(conditions.temperature).all():
+    if wants and not np.isfinite(temperature).all():
         raise ParameterError(
             f"simulate: the model's {', '.join(wants)} needs the tread temperature, which was not "
             "given; give --temperature DEGC"
@@ -167,26 +103,23 @@ def _check_known(model: TireModel, conditions: RollingConditions) -> None:
 
 
 def _pressed(
-    model: TireModel, values: Mapping[str, float | FloatArray], points: Operating, low_pass: LowPass
+    model: TireModel, values: Mapping[str, float | FloatArray], points: Operating
 ) -> Solution | State:
     """Return the rolling ring over `TURN` as `compare` predicts it, or the linear ring."""
     solve = solved if model.large else predict
-    return solve(values, points, model.changes, low_pass=low_pass, phi=TURN)
+    return solve(values, points, model.changes, low_pass=LowPass(), phi=TURN)
 
 
-def _load_at(
+def _at_deflection(
     model: TireModel,
     values: Mapping[str, float | FloatArray],
-    conditions: RollingConditions,
+    points: Operating,
     deflection: FloatArray,
-    low_pass: LowPass,
-    tire: Tire,
-) -> FloatArray:
-    """Return the loads that press the model by deflections, by the secant rule."""
+) -> Operating:
+    """Return the points at the loads that press the model by deflections, by the secant rule."""
 
     def depth(load: FloatArray) -> FloatArray:
-        points = conditions.at(load, tire.ring_radius)
-        return _pressed(model, values, points, low_pass).deflection
+        return _pressed(model, values, replace(points, load=load)).deflection
 
     load = 1.2e5 * deflection  # a third less than a usual tire's 180 N/mm: an easy first solve
     more = load * (1.0 + TRIAL)
@@ -196,7 +129,7 @@ def _load_at(
         step = (deflection - now) / np.where(slope > 0.0, slope, np.inf)
         load, before, more = more, now, np.clip(more + step, 0.5 * more, 2.0 * more)
         if np.abs(deflection - now).max() < DEFLECTION_SETTLED:
-            return load
+            return replace(points, load=load)
         moved = more != load
         more = np.where(moved, more, load * (1.0 + 1e-9))
         now = depth(more)
@@ -256,7 +189,6 @@ def _simulation(
     rate = _slope(found.strain)
     closed = (found.u, found.v, found.pressure, found.up, found.along, found.strain, rate)
     u, v, pressure, up, along, strain, rate = (_closed(x) for x in closed)
-    phi = np.append(TURN, np.pi)
     return Simulation(
         tire,
         "radial",
@@ -265,9 +197,9 @@ def _simulation(
         points.load,
         deflection,
         found.edges,
-        _at_middle(phi, pressure, found.edges),
-        _centre(phi, pressure, tire.ring_radius),
-        phi,
+        _at_middle(pressure, found.edges),
+        tire.ring_radius * (pressure @ np.sin(PHI)) / (pressure @ np.cos(PHI)),
+        PHI,
         u,
         v,
         pressure,
@@ -304,12 +236,6 @@ def _closed(values: FloatArray) -> FloatArray:
     return np.concatenate([values, values[:, :1]], axis=1)
 
 
-def _at_middle(phi: FloatArray, pressure: FloatArray, edges: FloatArray) -> FloatArray:
+def _at_middle(pressure: FloatArray, edges: FloatArray) -> FloatArray:
     middles = edges.mean(axis=1)
-    return np.array([np.interp(m, phi, q) for m, q in zip(middles, pressure, strict=True)])
-
-
-def _centre(phi: FloatArray, pressure: FloatArray, radius: float) -> FloatArray:
-    """Return R int q sin / int q cos."""
-    out: FloatArray = radius * (pressure @ np.sin(phi)) / (pressure @ np.cos(phi))
-    return out
+    return np.array([np.interp(m, PHI, q) for m, q in zip(middles, pressure, strict=True)])

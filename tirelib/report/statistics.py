@@ -9,11 +9,10 @@ from tirelib.estimators.dissertation import Regression
 from tirelib.estimators.polynomial import Polynomial
 from tirelib.estimators.train import Trained
 from tirelib.report.accuracy import FACTOR, QUANTITIES, TITLE, UNIT
+from tirelib.report.figures.lateral_force import SMALL_ANGLE
 from tirelib.report.figures.regression import in_use, rms
 from tirelib.report.page import DASH, Table, number, p_value
 
-SMALL_ANGLE = 5.5
-"""Slip angle, [deg], up to which the dissertation regresses."""
 REGRESSOR_UNIT = {
     "contact_angle": "rad",
     "angle_slope": "rad",

@@ -3,10 +3,9 @@
 from tirelib.report.figures.contact import figure_4_3
 from tirelib.report.figures.cornering import figure_4_20, figure_4_23
 from tirelib.report.figures.lateral_force import figure_4_12, figure_4_14
-from tirelib.report.figures.load import figure_4_4
-from tirelib.report.figures.overview import figure_accuracy
+from tirelib.report.figures.overview import figure_4_8, figure_accuracy
+from tirelib.report.figures.regression import figure_4_4, figure_4_5, figure_4_7
 from tirelib.report.figures.residuals import figure_residuals
-from tirelib.report.figures.slip_angle import figure_4_5, figure_4_7, figure_4_8
 
 __all__ = [
     "figure_4_3",

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tirelib.core.arrays import BoolArray, FloatArray
@@ -11,9 +10,9 @@ from tirelib.core.errors import CalibrationError
 from tirelib.estimators.train import Trained
 from tirelib.report.figures.regression import (
     RESIDUAL,
-    find_regression,
     in_use,
     largest,
+    needed_regression,
     residual_panel,
     rms,
     scatter_levels,
@@ -33,31 +32,48 @@ from tirelib.report.style import (
 )
 
 FORCE = label("lateral force Fy", "N", signed=True)
+SMALL_ANGLE = 5.5
+"""Slip angle, [deg], up to which the dissertation regresses."""
 CAMBERS = (BLUE, GREEN, ORANGE, PURPLE, RED)
 
 
-def _column(
-    agreement: Axes,
-    residual: Axes,
-    measured: FloatArray,
-    estimated: FloatArray,
-    levels: Sequence[Level],
-    rows: BoolArray | None,
-    colours: Sequence[str] | None,
-) -> None:
-    """Draw one estimator: agreement above, residual below."""
-    scatter_levels(agreement, measured, estimated, levels, rows, colours)
-    diagonal(agreement, measured, estimated)
-    scatter_levels(residual, measured, measured - estimated, levels, rows, colours)
-    residual.set_xlabel("measured " + FORCE)
+class _Columns:
+    """A figure with a column for each estimator: agreement above, residual below, one scale."""
 
+    def __init__(self, count: int, width: float) -> None:
+        self.figure = new_figure(width, 7.2)
+        grid = self.figure.subplots(
+            2, count, sharex=True, sharey="row", height_ratios=(2, 1), squeeze=False
+        )
+        self.upper, self.lower = list(grid[0]), list(grid[1])
+        self.errors: list[FloatArray] = []
 
-def _finish(figure: Figure, upper: Sequence[Axes], lower: Sequence[Axes], half: float) -> None:
-    upper[0].set_ylabel("estimated " + FORCE)
-    lower[0].set_ylabel(label(RESIDUAL, "N"))
-    for axes in lower:
-        residual_panel(axes, half)
-    legend_below(figure, upper, columns=7)
+    def draw(
+        self,
+        column: int,
+        measured: FloatArray,
+        estimated: FloatArray,
+        levels: Sequence[Level],
+        rows: BoolArray | None = None,
+        colours: Sequence[str] | None = None,
+    ) -> float:
+        """Draw an estimator, and return the rms of its error."""
+        upper, lower, error = self.upper[column], self.lower[column], measured - estimated
+        scatter_levels(upper, measured, estimated, levels, rows, colours)
+        diagonal(upper, measured, estimated)
+        scatter_levels(lower, measured, error, levels, rows, colours)
+        lower.set_xlabel("measured " + FORCE)
+        self.errors.append(error)
+        return rms(error)
+
+    def finished(self) -> Figure:
+        """Return the figure with its labels and its legend."""
+        self.upper[0].set_ylabel("estimated " + FORCE)
+        self.lower[0].set_ylabel(label(RESIDUAL, "N"))
+        for axes in self.lower:
+            residual_panel(axes, largest(*self.errors))
+        legend_below(self.figure, self.upper, columns=7)
+        return self.figure
 
 
 @styled
@@ -71,43 +87,22 @@ def figure_4_12(trained: Trained) -> Figure:
     CalibrationError
         If the campaign holds too little lateral force.
     """
-    six = find_regression(trained, "Table 4-1")
-    if six is None:
-        raise CalibrationError(
-            "Table 4-1: Fy was not varied or not measured; the figure needs slip angles"
-        )
+    six = needed_regression(trained, "Table 4-1", "Fy", "slip angles")
     held = in_use(trained, "Fy")
-    columns = 2 if held else 1
-    figure = new_figure(5.4 * columns + 0.6, 7.2)
-    grid = figure.subplots(
-        2, columns, sharex=True, sharey="row", height_ratios=(2, 1), squeeze=False
-    )
-    _column(
-        grid[0, 0],
-        grid[1, 0],
-        six.measured,
-        six.fitted,
-        load_levels(trained.means.load),
-        six.rows,
-        None,
-    )
-    rest = six.measured - six.fitted
-    grid[0, 0].set_title(
-        f"Six regressors (Table 4-1): R\u00b2 = {six.r2:.4f}\nrms {rms(rest):.0f} N, "
+    columns = _Columns(2 if held else 1, 11.4 if held else 6.0)
+    levels = load_levels(trained.means.load)
+    left = columns.draw(0, six.measured, six.fitted, levels, six.rows)
+    columns.upper[0].set_title(
+        f"Six regressors (Table 4-1): R\u00b2 = {six.r2:.4f}\nrms {left:.0f} N, "
         f"held out {six.cross_validated:.0f} N"
     )
-    half = largest(rest)
     if held is not None:
-        measured, estimated = held
-        rows = np.abs(np.rad2deg(trained.links.truth["slip_angle"])) <= 5.5
-        rows |= ~np.isfinite(trained.links.truth["slip_angle"])
+        angle = trained.links.truth["slip_angle"]
+        rows = (np.abs(np.rad2deg(angle)) <= SMALL_ANGLE) | ~np.isfinite(angle)
         levels = load_levels(trained.links.truth["Fz"])
-        _column(grid[0, 1], grid[1, 1], measured[rows], estimated[rows], levels, rows, None)
-        error = (measured - estimated)[rows]
-        grid[0, 1].set_title(f"Estimator in use, held out\nrms {rms(error):.0f} N")
-        half = largest(rest, error)
-    _finish(figure, grid[0], grid[1], half)
-    return figure
+        left = columns.draw(1, held[0][rows], held[1][rows], levels, rows)
+        columns.upper[1].set_title(f"Estimator in use, held out\nrms {left:.0f} N")
+    return columns.finished()
 
 
 @styled
@@ -129,56 +124,29 @@ def figure_4_14(trained: Trained) -> Figure:
     cambers = camber_levels(trained.means.camber)
     colours = [CAMBERS[i % len(CAMBERS)] for i in range(len(cambers))]
     held = in_use(trained, "Fy")
-    columns = 3 if held else 2
-    figure = new_figure(4.6 * columns, 7.2)
-    grid = figure.subplots(
-        2, columns, sharex=True, sharey="row", height_ratios=(2, 1), squeeze=False
-    )
-    parts = []
-    for regression in tables:
-        _column(
-            grid[0, 0],
-            grid[1, 0],
-            regression.measured,
-            regression.fitted,
-            cambers,
-            regression.rows,
-            colours,
-        )
-        parts.append(regression.measured - regression.fitted)
-    lowest = min(regression.r2 for regression in tables)
-    held_out = max(regression.cross_validated for regression in tables)
-    grid[0, 0].set_title(
+    columns = _Columns(3 if held else 2, 13.8 if held else 9.2)
+    for each in tables:
+        columns.draw(0, each.measured, each.fitted, cambers, each.rows, colours)
+    lowest, held_out = min(r.r2 for r in tables), max(r.cross_validated for r in tables)
+    columns.upper[0].set_title(
         f"Six regressors, refitted at each camber\nR\u00b2 \u2265 {lowest:.4f}, "
         f"held out \u2264 {held_out:.0f} N"
     )
-    _unaware(trained, list(grid[:, 1]), cambers, colours, parts)
+    measured = trained.means.lateral_force
+    left = columns.draw(1, measured, _unaware(trained), cambers, None, colours)
+    columns.upper[1].set_title(f"Six regressors, one fit for all cambers\nrms {left:.0f} N")
     if held is not None:
         levels = camber_levels(np.rad2deg(trained.links.values["camber"]))
-        measured, estimated = held
-        _column(grid[0, 2], grid[1, 2], measured, estimated, levels, None, colours[: len(levels)])
-        parts.append(measured - estimated)
-        grid[0, 2].set_title(
-            f"Estimator in use for all cambers, held out\nrms {rms(parts[-1]):.0f} N"
-        )
-    _finish(figure, grid[0], grid[1], largest(*parts))
-    return figure
+        left = columns.draw(2, *held, levels, None, colours[: len(levels)])
+        columns.upper[2].set_title(f"Estimator in use for all cambers, held out\nrms {left:.0f} N")
+    return columns.finished()
 
 
-def _unaware(
-    trained: Trained,
-    column: Sequence[Axes],
-    cambers: Sequence[Level],
-    colours: Sequence[str],
-    parts: list[FloatArray],
-) -> None:
-    """Draw six regressors with one set of coefficients for all cambers."""
+def _unaware(trained: Trained) -> FloatArray:
+    """Return Fy by six regressors with one set of coefficients for all cambers."""
     means = trained.means
     near = np.sort(np.argsort(np.abs(means.lateral), kind="stable")[:3])
-    design = np.concatenate(
-        (np.ones((means.load.size, 1)), means.contact_length[:, near], means.cp1[:, near]), axis=1
-    )
-    fitted = design @ np.linalg.lstsq(design, means.lateral_force, rcond=None)[0]
-    _column(column[0], column[1], means.lateral_force, fitted, cambers, None, colours)
-    parts.append(means.lateral_force - fitted)
-    column[0].set_title(f"Six regressors, one fit for all cambers\nrms {rms(parts[-1]):.0f} N")
+    one = np.ones((means.load.size, 1))
+    design = np.concatenate((one, means.contact_length[:, near], means.cp1[:, near]), axis=1)
+    found = np.linalg.lstsq(design, means.lateral_force, rcond=None)[0]
+    return np.asarray(design @ found)

@@ -1,4 +1,6 @@
-"""Accuracy at a glance: estimated against measured for every quantity, with 95 % intervals."""
+"""Estimated against measured with 95 % intervals: each quantity, and turn by turn (Fig. 4-8)."""
+
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,9 +19,11 @@ from tirelib.report.accuracy import (
     accuracy,
     compare,
 )
-from tirelib.report.figures.regression import RESIDUAL, largest, residual_panel
+from tirelib.report.figures.regression import ANGLE, RESIDUAL, largest, residual_panel, rms
 from tirelib.report.levels import load_levels
 from tirelib.report.style import (
+    BLACK,
+    FAINT,
     MARKERS,
     diagonal,
     label,
@@ -27,6 +31,7 @@ from tirelib.report.style import (
     new_figure,
     sequence,
     styled,
+    zero_line,
 )
 
 
@@ -49,27 +54,12 @@ def _column(part: Compared, upper: Axes, lower: Axes) -> None:
     levels = load_levels(part.load)
     error = part.measured - part.estimated
     for i, (level, colour) in enumerate(zip(levels, sequence(len(levels)), strict=True)):
-        x, marker = part.measured[level.rows], MARKERS[i % len(MARKERS)]
-        upper.errorbar(
-            x,
-            part.estimated[level.rows],
-            WIDTH * part.std[level.rows],
-            fmt=marker,
-            color=colour,
-            markersize=3.6,
-            elinewidth=0.8,
-            label=level.text,
-        )
-        lower.errorbar(
-            x,
-            error[level.rows],
-            WIDTH * part.std[level.rows],
-            fmt=marker,
-            color=colour,
-            markersize=3.0,
-            elinewidth=0.7,
-            alpha=0.75,
-        )
+        x, half = part.measured[level.rows], WIDTH * part.std[level.rows]
+        look: dict[str, Any] = {"fmt": MARKERS[i % len(MARKERS)], "color": colour}
+        above = look | {"markersize": 3.6, "elinewidth": 0.8, "label": level.text}
+        below = look | {"markersize": 3.0, "elinewidth": 0.7, "alpha": 0.75}
+        upper.errorbar(x, part.estimated[level.rows], half, **above)
+        lower.errorbar(x, error[level.rows], half, **below)
     diagonal(upper, part.measured, part.estimated)
     digits = {"N": 1, "deg": 3, "%": 3}[unit]
     fit = f"R\u00b2 {row.r2:.5f}" if np.isfinite(row.r2) else "not varied"
@@ -83,3 +73,48 @@ def _column(part: Compared, upper: Axes, lower: Axes) -> None:
     residual_panel(lower, largest(error - WIDTH * part.std, error + WIDTH * part.std))
     upper.margins(0.06)
     lower.xaxis.set_major_locator(MaxNLocator(5))
+
+
+@styled
+def figure_4_8(observations: Observations, estimates: Estimates) -> Figure:
+    """Measured and estimated slip angle, turn after turn, load after load, with the residual.
+
+    Source: dissertation, Fig. 4-8.
+    """
+    measured = np.rad2deg(observations.truth["slip_angle"])
+    value, std = np.rad2deg(estimates.value["alpha"]), np.rad2deg(estimates.std["alpha"])
+    good = estimates.valid["alpha"] & np.isfinite(measured)
+    levels = load_levels(np.where(good, observations.truth["Fz"], np.nan))
+    figure = new_figure(12.5, 6.2)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    start = 0
+    for level, colour in zip(levels, sequence(len(levels)), strict=True):
+        rows = np.flatnonzero(level.rows)
+        at = start + np.arange(rows.size)
+        upper.step(at, measured[rows], where="mid", color=FAINT, linewidth=1.4, label="measured")
+        look: dict[str, Any] = {"fmt": "o", "color": colour, "markersize": 3.2, "elinewidth": 0.9}
+        error, half = measured[rows] - value[rows], WIDTH * std[rows]
+        upper.errorbar(at, value[rows], half, **look, label=f"estimated, {level.text}")
+        lower.errorbar(at, error, half, **look)
+        upper.text(
+            start + 0.5 * rows.size,
+            1.02,
+            f"{level.text}: rms {rms(error):.2f} deg",
+            transform=upper.get_xaxis_transform(),
+            ha="center",
+            va="bottom",
+            fontsize=9.5,
+        )
+        start += rows.size
+        for axes in (upper, lower):
+            axes.axvline(start - 0.5, color=BLACK, linewidth=0.6, alpha=0.5)
+    zero_line(upper)
+    zero_line(lower)
+    upper.set_ylabel(ANGLE)
+    lower.set_ylabel(label(RESIDUAL, "deg"))
+    lower.set_xlabel("valid turn, in order of measurement within each load [-]")
+    upper.set_xlim(-1, max(start, 1))
+    upper.grid(visible=False, axis="x")
+    lower.grid(visible=False, axis="x")
+    legend_below(figure, [upper], columns=6)
+    return figure

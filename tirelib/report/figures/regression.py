@@ -1,23 +1,51 @@
-"""Common parts of the regression figures: a curve with its data, and its residuals."""
+"""Regressions over one regressor: load and slip angle (Fig. 4-4, 4-5, 4-7); their common parts."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.dissertation import Regression
 from tirelib.estimators.train import Trained
 from tirelib.report.accuracy import FACTOR, TRUTH
-from tirelib.report.levels import Level
-from tirelib.report.style import MARKERS, sequence, zero_line
+from tirelib.report.levels import Level, load_levels, reference_level
+from tirelib.report.style import (
+    MARKERS,
+    label,
+    legend_below,
+    new_figure,
+    sequence,
+    styled,
+    zero_line,
+)
 
 RESIDUAL = "measured \N{MINUS SIGN} estimated"
+ANGLE = label("slip angle", "deg", signed=True)
+_FIT = np.polynomial.polynomial
 
 
 def find_regression(trained: Trained, source: str) -> Regression | None:
     """Return the dissertation's regression of a figure or table; None where it was not fitted."""
     return next((r for r in trained.regressions if r.source == source), None)
+
+
+def needed_regression(trained: Trained, source: str, what: str, needs: str) -> Regression:
+    """Return the dissertation's regression of a figure or table.
+
+    Raises
+    ------
+    CalibrationError
+        If it was not fitted: `what` was not varied, and the figure needs `needs`.
+    """
+    found = find_regression(trained, source)
+    if found is None:
+        raise CalibrationError(
+            f"{source}: {what} was not varied or not measured; the figure needs {needs}"
+        )
+    return found
 
 
 def scatter_levels(
@@ -49,12 +77,6 @@ def scatter_levels(
             )
 
 
-def curve(axes: Axes, x: FloatArray, value: Callable[[FloatArray], FloatArray], text: str) -> None:
-    """Draw a fitted curve over the range of x."""
-    grid = np.linspace(float(x.min()), float(x.max()), 200)
-    axes.plot(grid, value(grid), color="#333333", linewidth=1.6, zorder=4, label=text)
-
-
 def residual_panel(axes: Axes, half: float) -> None:
     """Set a residual axes up: zero line and symmetric limits."""
     zero_line(axes)
@@ -82,3 +104,157 @@ def largest(*parts: FloatArray) -> float:
     every = np.abs(np.concatenate([part.ravel() for part in parts]))
     every = every[np.isfinite(every)]
     return float(every.max()) if every.size else 1.0
+
+
+@styled
+def figure_4_4(trained: Trained) -> Figure:
+    """Load against centre contact length with the quadratic, its residuals, and those in use.
+
+    Source: dissertation, Fig. 4-4.
+
+    Raises
+    ------
+    CalibrationError
+        If the campaign did not vary the load.
+    """
+    found = needed_regression(trained, "Fig. 4-4", "the load", "several loads")
+    b = [term.coefficient for term in found.terms]
+    name = label("vertical load Fz", "N")
+    regressor = label("contact length l of the centre gage", "mm")
+    held = in_use(trained, "Fz")
+    figure, panels = _panels(held, 4.5, (9.0, 12.5))
+    fitted = "quadratic, ordinary least squares"
+    _over(panels[0], trained, found, regressor, f"measured {name}", fitted)
+    panels[0].set_title(
+        f"Fz = {b[0]:.0f} {b[1]:+.2f} l {b[2]:+.4f} l\u00b2\nR\u00b2 = {found.r2:.4f}"
+    )
+    said = "Residuals of the quadratic\nrms {:.0f} N, held out {:.0f} N"
+    own = "Estimator in use, held out\nrms {:.1f} N"
+    _residuals(figure, panels, trained, found, held, name, said, own)
+    return figure
+
+
+@styled
+def figure_4_5(trained: Trained) -> Figure:
+    """Slip angle against the in/out ratio of the rate peaks with the quadratic and its residuals.
+
+    Source: dissertation, Fig. 4-5.
+
+    Raises
+    ------
+    CalibrationError
+        If the campaign did not vary the slip angle.
+    """
+    regressor = label("in/out ratio of peak strain rates", "-", signed=True)
+    return _of_angle(trained, "Fig. 4-5", regressor, None)
+
+
+@styled
+def figure_4_7(trained: Trained) -> Figure:
+    """Slip angle against the slope of the peak rates, residuals, the estimator in use beside it.
+
+    Source: dissertation, Fig. 4-7.
+
+    Raises
+    ------
+    CalibrationError
+        If the campaign did not vary the slip angle.
+    """
+    regressor = label("slope of peak strain rates", "1/(rad m)", signed=True)
+    return _of_angle(trained, "Fig. 4-7", regressor, in_use(trained, "alpha"))
+
+
+_InUse = tuple[FloatArray, FloatArray] | None
+"""Measured and estimated values; None where the quantity is not calibrated or not shown."""
+
+
+def _of_angle(trained: Trained, source: str, regressor: str, held: _InUse) -> Figure:
+    """Draw a regression of the slip angle; thin lines are fits to one load each."""
+    found = needed_regression(trained, source, "the slip angle", "slip angles")
+    levels, rows = load_levels(trained.means.load), found.rows
+    x, measured, degree = found.regressor, found.measured, len(found.terms) - 1
+    figure, panels = _panels(held, 4.6, (9.5, 12.5))
+    _over(panels[0], trained, found, regressor, f"measured {ANGLE}", "fit over all loads")
+    for level, colour in zip(levels, sequence(len(levels)), strict=True):
+        here = level.rows[rows]
+        if here.sum() > degree + 2:
+            ends = np.linspace(float(x[here].min()), float(x[here].max()), 60)
+            own = _FIT.polyval(ends, _FIT.polyfit(x[here], measured[here], degree))
+            panels[0].plot(ends, own, color=colour, linewidth=0.9, zorder=2)
+    reference = reference_level(levels)
+    panels[0].set_title(
+        f"All loads R\u00b2 = {found.r2:.3f}; {reference.text} alone "
+        f"R\u00b2 = {_alone(found, reference.rows[rows], degree):.3f}"
+    )
+    low, high = float(measured.min()), float(measured.max())
+    room = 0.35 * (high - low)
+    panels[0].set_ylim(low - room, high + room)
+    said = "Residuals: rms {:.2f} deg, held out {:.2f} deg"
+    own_words = "Estimator in use, held out: rms {:.3f} deg"
+    most = float(np.abs(measured).max()) + 0.5
+    _residuals(figure, panels, trained, found, held, ANGLE, said, own_words, most, signed=True)
+    return figure
+
+
+def _alone(regression: Regression, rows: BoolArray, degree: int) -> float:
+    """R2 of the same polynomial, fitted to one load only."""
+    x, y = regression.regressor[rows], regression.measured[rows]
+    if x.size <= degree + 1:
+        return float("nan")
+    rest = y - _FIT.polyval(x, _FIT.polyfit(x, y, degree))
+    return 1.0 - float(np.sum(rest**2) / np.sum((y - y.mean()) ** 2))
+
+
+def _panels(held: _InUse, height: float, widths: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+    """Return a figure with room for the regression, its residuals and, third, those in use."""
+    figure = new_figure(widths[1] if held else widths[0], height)
+    return figure, list(figure.subplots(1, 3 if held else 2))
+
+
+def _over(
+    axes: Axes, trained: Trained, found: Regression, regressor: str, measured: str, curve: str
+) -> None:
+    """Draw what was measured over the regressor, and the fitted polynomial."""
+    x, levels = found.regressor, load_levels(trained.means.load)
+    scatter_levels(axes, x, found.measured, levels, found.rows)
+    grid = np.linspace(float(x.min()), float(x.max()), 200)
+    fitted = _FIT.polyval(grid, [term.coefficient for term in found.terms])
+    axes.plot(grid, fitted, color="#333333", linewidth=1.6, zorder=4, label=curve)
+    axes.set_xlabel(regressor)
+    axes.set_ylabel(measured)
+
+
+def _residuals(
+    figure: Figure,
+    panels: Sequence[Axes],
+    trained: Trained,
+    found: Regression,
+    held: _InUse,
+    name: str,
+    said: str,
+    own: str,
+    most: float = np.inf,
+    *,
+    signed: bool = False,
+) -> None:
+    """Draw the residuals of the regression and, up to a magnitude, of the estimator in use.
+
+    `said` and `own` are the titles of the two panels, with room for their rms.
+    """
+    rest = found.measured - found.fitted
+    half, levels = largest(rest), load_levels(trained.means.load)
+    scatter_levels(panels[1], found.fitted, rest, levels, found.rows)
+    panels[1].set_title(said.format(rms(rest), found.cross_validated))
+    if held is not None:
+        measured, estimated = held
+        rows = np.abs(measured) <= most
+        error = (measured - estimated)[rows]
+        own_levels = load_levels(trained.links.truth["Fz"])
+        scatter_levels(panels[2], estimated[rows], error, own_levels, rows)
+        panels[2].set_title(own.format(rms(error)))
+        half = largest(rest, error)
+    for axes in panels[1:]:
+        residual_panel(axes, half)
+        axes.set_xlabel(f"estimated {name}")
+        axes.set_ylabel(label(RESIDUAL, found.unit, signed=signed))
+    legend_below(figure, panels[:1], columns=7)
