@@ -34,13 +34,11 @@ def write_calibration_report(
 
     Parameters
     ----------
-    trained : Trained
     folder : path
         Made if needed; an earlier report in it is overwritten.
     held_out : sequence of mappings
         Cross-validation by level: ``held_out, level, quantity, unit, dissertation, in_use`` and
         optionally ``inside, n``.
-    title : str, optional
 
     Returns
     -------

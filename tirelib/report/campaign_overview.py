@@ -35,7 +35,6 @@ def overview_figure(header: CampaignHeader, rows: Sequence[RunRow], runs: Sequen
 
     Parameters
     ----------
-    header : CampaignHeader
     rows : sequence of RunRow
         All runs.
     runs : sequence of Run

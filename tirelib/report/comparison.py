@@ -52,13 +52,7 @@ BRUSH = (
 
 
 def write_comparison(found: Comparison | ForceComparison, folder: Path) -> tuple[Path, Path]:
-    """Write ``index.html`` and ``comparison.md``; return their paths.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written.
-    """
+    """Write ``index.html`` and ``comparison.md``; return their paths."""
     told = comparison_document(found)
     if isinstance(found, ForceComparison):
         parts = force_parts(found)

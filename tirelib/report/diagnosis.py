@@ -44,17 +44,10 @@ def write_diagnosis(
 
     Parameters
     ----------
-    found : Assessment or ForceAssessment
     told : mapping
         ``tirelib-diagnosis/1`` of it, with its explanation.
-    folder : Path
     history : sequence of mapping
         History of the model, as its file holds it.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written.
     """
     return write_parts_page(
         folder,

@@ -19,12 +19,6 @@ def write_extension(told: Mapping[str, Any], folder: Path) -> tuple[Path, Path]:
     ----------
     told : mapping
         ``tirelib-extension/1``.
-    folder : Path
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written.
     """
     done = {"add": "Added", "remove": "Removed"}[told["action"]]
     fall = waterfall_of(told["history"], told["quantity"])

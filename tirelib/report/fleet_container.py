@@ -26,7 +26,6 @@ def container_page(
 
     Parameters
     ----------
-    task : str
     container : mapping
         Its row of ``container_metrics``.
     results, channels : sequences of mappings

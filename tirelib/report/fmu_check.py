@@ -36,13 +36,7 @@ def verdict(document: Document) -> str:
 
 
 def write_check(document: Document, folder: Path) -> Path:
-    """Write ``index.html`` and its figures.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written.
-    """
+    """Write ``index.html`` and its figures."""
     facts = document["facts"]
     name = facts.get("modelName") or document["file"]
     drawings = []

@@ -43,13 +43,7 @@ class Journey:
 
 
 def write_journey(journey: Journey, folder: Path) -> tuple[Path, Path]:
-    """Write ``index.html`` and ``index.md`` into a folder; return their paths.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written.
-    """
+    """Write ``index.html`` and ``index.md`` into a folder; return their paths."""
     told = journey.document
     links = [(page["title"], page["path"]) for page in told["pages"]]
     return write_parts_page(

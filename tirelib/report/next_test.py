@@ -34,13 +34,7 @@ SHOWN = 20
 
 
 def write_next_test(plan: Plan, folder: Path) -> tuple[Path, Path]:
-    """Write ``next_test.html`` and ``next_test.md``; return their paths.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written.
-    """
+    """Write ``next_test.html`` and ``next_test.md``; return their paths."""
     text = advice(plan)
     return write_parts_page(
         folder,

@@ -47,7 +47,6 @@ class Table:
 
         Parameters
         ----------
-        items : iterable
         columns : mapping
             The heading of each column, and what its cell says of an item.
         """

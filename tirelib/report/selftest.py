@@ -15,13 +15,7 @@ TITLE = "Effects that this plan can find"
 
 
 def write_selftest(document: Mapping[str, Any], folder: Path) -> tuple[Path, Path]:
-    """Write ``selftest.html`` and ``selftest.md`` of a ``tirelib-selftest/1``; return the paths.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written.
-    """
+    """Write ``selftest.html`` and ``selftest.md`` of a ``tirelib-selftest/1``; return the paths."""
     return write_parts_page(
         folder,
         "selftest",

@@ -54,7 +54,6 @@ class Simulation:
 
     Attributes
     ----------
-    tire : Tire
     contact : str
         radial: tread springs along the radius only; shear: tread pressed and sheared, free rolling
         of Eq. (103), (104).
@@ -154,7 +153,6 @@ def simulate(
 
     Parameters
     ----------
-    tire : Tire
     load, deflection : scalar or shape (n_points,), [N], [m]
         One of the two.
     inflation : scalar or shape (n_points,), [Pa]

@@ -45,7 +45,6 @@ def simulate_file(
 
     Parameters
     ----------
-    model : TireModel
     tire : Tire
         The model's, with the damping that is to be simulated.
     load, deflection : shape (n_points,), [N], [m]

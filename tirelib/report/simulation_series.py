@@ -34,7 +34,6 @@ def bending_length(tire: Tire, inflation: FloatArray) -> float:
 
     Parameters
     ----------
-    tire : Tire
     inflation : shape (n_points,), [Pa]
     """
     bending = tire.bending_stiffness
@@ -106,7 +105,6 @@ def long_series(found: ShearContact, ring: Compliance, n_angles: int) -> Complex
 
     Parameters
     ----------
-    found : ShearContact
     ring : Compliance
         The ring of the contact, with as many harmonics as are wanted.
     n_angles : int

@@ -101,14 +101,12 @@ class Yardstick:
     ----------
     strain : shape (n_runs, n_phi), [-]
         Mean over the gages in use.
-    at : Operating
     scale : shape (n_runs, 4)
         Standard deviations of load, pressure, gain (relative) and angle zero [rad].
     noise : float, [-]
         NaN without repeats.
     lateral : tuple of float, [m]
         Places of the gages in use.
-    low_pass : LowPass
     """
 
     strain: FloatArray
@@ -154,7 +152,6 @@ class Yardstick:
 
         Parameters
         ----------
-        model : TireModel
         delay : float, optional, [s]
             That of the runs to which the model was fitted, where these are others; it is fitted
             here by default.

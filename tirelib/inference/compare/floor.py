@@ -46,7 +46,6 @@ def floor_of(model: TireModel, data_hash: str, error: ModelError, points: Operat
 
     Parameters
     ----------
-    model : TireModel
     data_hash : str
         Hash of the campaign: a floor on other data is none here.
     error : ModelError

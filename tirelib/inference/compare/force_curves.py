@@ -27,7 +27,6 @@ class Curve:
         Numbers of the points, by rising slip.
     rms : float
         Rms of model less measured, in the unit of the force.
-    words : str
     """
 
     load: float

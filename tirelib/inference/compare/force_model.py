@@ -28,13 +28,10 @@ class ForceModel:
 
     Attributes
     ----------
-    name : str
-    brush : BrushModel
     used : tuple of UsedEffect
         Effects of stage brush.
     reference : (load, pressure), [N], [Pa]
         At which laws of load and pressure change nothing.
-    history : tuple of mapping
     """
 
     name: str

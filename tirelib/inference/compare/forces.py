@@ -58,7 +58,6 @@ class ForceCell:
         all, load, pressure, slip_angle, slip_ratio or camber (sizes of the slips).
     low, high : float
         Range, SI.
-    points : int
     rms, mean : float
         Rms and mean of model less measured.
     excess, excess_std : float
@@ -99,10 +98,8 @@ class ForceComparison:
 
     Attributes
     ----------
-    quantity : str
     name : str
         Name of the campaign.
-    model : str
     data : ForceData
         Means over cells.
     run : shape (n,)
@@ -114,11 +111,6 @@ class ForceComparison:
         Cells with more than one point.
     error : float
         Rms of model less measured over the noise; in N or N m without repeats.
-    rms, measured_rms : float
-    p : float
-    verdict : str
-    table : tuple of ForceCell
-    sentences, messages : tuple of str
     used : tuple of UsedEffect
         Effects that the model has.
     floor : float
@@ -177,8 +169,6 @@ def compare_forces(
 
     Parameters
     ----------
-    campaign : Campaign
-    file : TireFile
     quantity : str, optional
         Fy, Fx or Mz; by default the one with the largest lack of fit.
     effects : mapping

@@ -82,14 +82,12 @@ def compare_gages(
 
     Parameters
     ----------
-    chosen : Chosen
     by_gage : shape (n_runs, n_gages, n_phi), [-]
         Model less measured, set points taken out.
     difference : shape (n_runs, n_phi), [-]
         The same of the mean over the gages.
     sector : shape (n_runs, n_phi)
         Number in `SECTORS`.
-    points : SetPoints
     """
     strain = chosen.waves.strain[:, chosen.gages]
     counted, out = chosen.straight, []

@@ -33,10 +33,8 @@ def model_points(
 
     Parameters
     ----------
-    model : ForceModel
     slip_angle : float, [rad]
         The largest; the points reach from its negative to it.
-    slip_ratio : float
     speed : float, [m/s]
     radius : float, [m]
         Unloaded radius, for the turn rate.

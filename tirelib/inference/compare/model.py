@@ -43,10 +43,8 @@ class TireModel:
 
     Attributes
     ----------
-    name : str
     values : mapping
         Numbers of `Tire`, SI.
-    used : tuple of UsedEffect
     large : bool
         Whether the correction for large displacements belongs to it.
     history : tuple of mapping
@@ -202,8 +200,6 @@ def predict_runs(
 
     Parameters
     ----------
-    model : TireModel
-    points : Operating
     lateral : sequence of float, [m]
         Positions of the gages that are averaged (left positive).
     low_pass : LowPass

@@ -60,8 +60,6 @@ def plot_data(
 
     Parameters
     ----------
-    found : Comparison or ForceComparison
-    campaign : Campaign
     file : TireFile
         The model that was compared.
     planted : sequence of (name, strength)
@@ -122,7 +120,6 @@ def measured_data(campaign: Campaign, runs: Iterable[Run] | None = None) -> dict
 
     Parameters
     ----------
-    campaign : Campaign
     runs : iterable of Run, optional
         The campaign's, where somebody else looks at each of them too; forces are read by
         themselves.

@@ -42,7 +42,6 @@ class Region:
         "above", "below" or "".
     value : float
         Least (above) or largest (below) value of the condition, SI; NaN for "all".
-    runs : int
     mean : float, [-]
         Model less measured.
     std : float, [-]
@@ -123,7 +122,6 @@ def find_regions(
     strain : shape (n_runs, n_phi), [-]
         Measured.
     counted : shape (n_runs,)
-    factors, noise, points
     """
     if not noise.known:
         return ()

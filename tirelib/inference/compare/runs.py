@@ -45,16 +45,13 @@ class Chosen:
 
     Attributes
     ----------
-    waves : Waveforms
     straight : shape (n_runs,)
         Runs that the error counts: straight and freely rolling, or all if there is none.
     gages : tuple of int
         Gages that are averaged.
     strain : shape (n_runs, n_phi), [-]
-    tolerance : Tolerance
     factors : tuple of Factor
         load, pressure and speed first; only those with more than one level.
-    notes : tuple of str
     """
 
     waves: Waveforms

@@ -60,8 +60,6 @@ class Cell:
         Condition, or "all".
     value : float
         Value of the level, SI; NaN for "all".
-    sector : str
-    runs : int
     rms, mean : float, [-]
     std : float, [-]
         Standard deviation of the mean, from repeats and set points; NaN without repeats.
@@ -93,7 +91,6 @@ def cells(
     sector : shape (n_runs, n_phi)
     counted : shape (n_runs,)
         Runs of the row "all".
-    factors, noise, points
     """
     groups: list[tuple[str, float, BoolArray]] = [("all", np.nan, counted)]
     for factor in factors:

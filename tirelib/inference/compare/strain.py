@@ -64,13 +64,10 @@ class Comparison:
     ----------
     chosen : Chosen
         Runs, gages and conditions.
-    model : TireModel
     error : ModelError
         Over the counted (straight) runs, with the delay.
     prediction : Prediction
         With the delay.
-    points : SetPoints
-    noise : RepeatNoise
     difference : shape (n_runs, n_phi), [-]
         Model less measured, set points taken out; positive: the model shows too much tension.
     by_gage : shape (n_runs, n_gages, n_phi), [-]
@@ -81,12 +78,8 @@ class Comparison:
         Rms of `difference`.
     fit : Fit
         Over the counted (straight) runs.
-    floor : Floor
-    table : tuple of Cell
-    regions : tuple of Region
     sentences : tuple of str
         Lack of fit in plain words: `regions`, set points, `tracks`, `gages`.
-    tracks : tuple of Track
     gages : tuple of Gage
         Each gage by itself.
     messages : tuple of str
@@ -134,8 +127,6 @@ def compare_strain(waves: Waveforms, model: TireModel, data_hash: str = "") -> C
 
     Parameters
     ----------
-    waves : Waveforms
-    model : TireModel
     data_hash : str
         `Campaign.content_hash()`; tells whether the model was identified from these data.
 

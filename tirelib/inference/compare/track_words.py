@@ -27,7 +27,6 @@ class TrackFit:
 
     Attributes
     ----------
-    runs : int
     mean, std : float
         Mean of model less measured, and its standard deviation by noise and set points.
     rms : float

@@ -37,8 +37,6 @@ class Plot:
 
     Attributes
     ----------
-    name, title, caption : str
-    figure : plotly figure
     columns : sequence of str
         Names with units.
     rows : sequence of rows
@@ -173,8 +171,6 @@ def heat(
     ----------
     z : shape (n_rows, n), in `unit`
     x : shape (n,)
-    x_title : str
-    height : int
     limit : float, optional
         End of the colour scale to both sides; by default one that a few extremes do not rule.
     digits : int

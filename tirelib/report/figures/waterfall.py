@@ -31,12 +31,10 @@ def waterfall(
 
     Parameters
     ----------
-    steps : sequence of Step
     unit : str
         Unit of the errors.
     floor : float
         Error that structure leaves without a missing effect; NaN if unknown.
-    name, title : str
     """
     labels = [f"{k}: {step.label}" if k else step.label for k, step in enumerate(steps)]
     figure = go.Figure()
