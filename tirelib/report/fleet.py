@@ -9,10 +9,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup
 
-from tirelib.report.figures.compare_plot import Plot, styled_figure
+from tirelib.report.figures.compare_plot import Plot, dots, level_line, styled_figure
 from tirelib.report.page import DASH, Part, Table, number
 from tirelib.report.parts_page import write_parts_page
 from tirelib.report.style import BLUE, FAINT, ORANGE, RED
@@ -156,23 +157,20 @@ def _parameters(parameters: Sequence[Mapping[str, Any]]) -> Part:
 
 
 def _parameter_plot(index: int, each: Mapping[str, Any]) -> Plot:
-    points = each["points"]
+    points, name = each["points"], each["name"].replace("_", " ")
     figure = go.Figure()
     labels = [f"{point['tire']}, {point['campaign']}" for point in points]
-    for outlier, colour, name in ((False, BLUE, "usual"), (True, ORANGE, "stands out")):
+    for outlier, colour, said in ((False, BLUE, "usual"), (True, ORANGE, "stands out")):
         chosen = [k for k, point in enumerate(points) if point["outlier"] is outlier]
         if not chosen:
             continue
-        values = [points[k]["value"] for k in chosen]
+        low, values, high = ([points[k][key] for k in chosen] for key in ("low", "value", "high"))
+        at, symbol = [labels[k] for k in chosen], "diamond" if outlier else "circle"
         figure.add_scatter(
-            x=[labels[k] for k in chosen],
-            y=values,
-            mode="markers",
-            name=name,
-            marker={"color": colour, "size": 9, "symbol": "diamond" if outlier else "circle"},
+            **dots(at, values, said, colour, 9, symbol=symbol),
             error_y={
-                "array": [points[k]["high"] - points[k]["value"] for k in chosen],
-                "arrayminus": [points[k]["value"] - points[k]["low"] for k in chosen],
+                "array": np.subtract(high, values).tolist(),
+                "arrayminus": np.subtract(values, low).tolist(),
                 "thickness": 1.2,
             },
             customdata=[points[k]["page"] for k in chosen],
@@ -180,20 +178,20 @@ def _parameter_plot(index: int, each: Mapping[str, Any]) -> Plot:
         )
     low, high = each["centre"] - 2 * each["scatter"], each["centre"] + 2 * each["scatter"]
     figure.add_hrect(y0=low, y1=high, fillcolor=FAINT, opacity=0.12, line_width=0)
-    figure.add_hline(y=each["centre"], line={"color": FAINT, "width": 1})
+    level_line(figure, each["centre"])
     figure.update_xaxes(
         categoryorder="array", categoryarray=labels, showticklabels=len(points) <= 40
     )
     styled_figure(figure, 360, showlegend=True, legend={"orientation": "h", "y": 1.12})
-    figure.update_yaxes(title=f"{each['name'].replace('_', ' ')} [{each['unit']}]")
-    return Plot(
+    figure.update_yaxes(title=f"{name} [{each['unit']}]")
+    columns = {key: key for key in ("tire", "campaign", "value", "low", "high")}
+    columns["stands out"] = "outlier"
+    return Plot.of(
         f"parameter-{index}",
-        f"{each['name'].replace('_', ' ')}"
-        + (f", free radius {each['size']}" * bool(each["size"])),
+        f"{name}, free radius {each['size']}" if each["size"] else name,
         _scattered(each),
         figure,
-        ("tire", "campaign", "value", "low", "high", "stands out"),
-        [[p["tire"], p["campaign"], p["value"], p["low"], p["high"], p["outlier"]] for p in points],
+        {heading: [point[key] for point in points] for heading, key in columns.items()},
     )
 
 
@@ -227,21 +225,21 @@ def _changes(changes: Sequence[Mapping[str, Any]]) -> Part:
 
 
 def _change_plot(channel: str, series: Sequence[Mapping[str, Any]]) -> Plot:
-    figure = go.Figure()
+    figure, rows = go.Figure(), []
     for each in series:
+        look = {"color": ORANGE, "width": 2.2} if each["changes"] else {"color": BLUE, "width": 0.8}
         figure.add_scatter(
             x=[datetime.fromtimestamp(t, UTC) for t in each["time"]],
             y=each["values"],
             mode="lines+markers",
             name=f"{each['tire']} {each['wheel']}".strip(),
-            line={
-                "color": ORANGE if each["changes"] else BLUE,
-                "width": 2.2 if each["changes"] else 0.8,
-            },
+            line=look,
             opacity=1.0 if each["changes"] else 0.55,
             customdata=each["pages"],
             hovertemplate="%{x|%Y-%m-%d}<br>%{y:.4g}<extra>%{fullData.name}</extra>",
         )
+        pairs = zip(each["time"], each["values"], strict=True)
+        rows += [[each["tire"], each["wheel"], *pair] for pair in pairs]
     styled_figure(figure, 340, showlegend=len(series) <= 12)
     figure.update_yaxes(title=f"{channel.replace('_', ' ')} [{series[0]['unit']}]")
     return Plot(
@@ -250,11 +248,7 @@ def _change_plot(channel: str, series: Sequence[Mapping[str, Any]]) -> Plot:
         f"{sum(each['changes'] for each in series)} of {len(series)} lines change. ",
         figure,
         ("tire", "wheel", "time_s", "value"),
-        [
-            [each["tire"], each["wheel"], time, value]
-            for each in series
-            for time, value in zip(each["time"], each["values"], strict=True)
-        ],
+        rows,
     )
 
 

@@ -59,32 +59,28 @@ def container_page(
 
 
 def _results(results: Sequence[Mapping[str, Any]]) -> Table:
-    rows = [
-        [
-            row["kind"],
-            row["name"],
-            row.get("text") or "",
-            (row.get("flags") or "").replace(";", ", "),
-            row.get("unit") or "",
-            number(row["value"]),
-            number(row.get("low")),
-            number(row.get("high")),
-        ]
-        for row in results
-    ]
-    columns = ("kind", "name", "text", "flags", "unit", "value", "95 % from", "to")
-    return Table("Results", columns, rows, texts=5)
+    return Table.of(
+        "Results",
+        results,
+        {
+            "kind": lambda row: row["kind"],
+            "name": lambda row: row["name"],
+            "text": lambda row: row.get("text") or "",
+            "flags": lambda row: (row.get("flags") or "").replace(";", ", "),
+            "unit": lambda row: row.get("unit") or "",
+            "value": lambda row: number(row["value"]),
+            "95 % from": lambda row: number(row.get("low")),
+            "to": lambda row: number(row.get("high")),
+        },
+        texts=5,
+    )
 
 
 def _channels(channels: Sequence[Mapping[str, Any]]) -> Table:
+    keys = ("mean", "std", "min", "max")
     rows = [
-        [
-            row["channel_name"],
-            row["unit"],
-            str(row["sample_count"]),
-            *(number(row[key]) for key in ("mean", "std", "min", "max")),
-        ]
+        [row["channel_name"], row["unit"], str(row["sample_count"])]
+        + [number(row[key]) for key in keys]
         for row in channels
     ]
-    columns = ("channel", "unit", "turns", "mean", "std", "min", "max")
-    return Table("Channels", columns, rows, texts=2)
+    return Table("Channels", ("channel", "unit", "turns", *keys), rows, texts=2)

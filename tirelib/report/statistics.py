@@ -58,24 +58,21 @@ def _side_by_side(regressions: Sequence[Regression]) -> Table:
     """Coefficients and p-values of the same terms at several cambers."""
     levels = [regression.name.split("camber ")[-1] for regression in regressions]
     levels = ["0 deg" if level in ("-0 deg", "+0 deg") else level for level in levels]
-    columns = ["term"]
-    for what in ("coefficient", "std error", "p value"):
-        columns += [f"{what}, {level}" for level in levels]
-    rows = []
-    for i, term in enumerate(regressions[0].terms):
-        terms = [regression.terms[i] for regression in regressions]
-        rows.append(
-            [
-                term.name,
-                *[number(t.coefficient, 5) for t in terms],
-                *[number(t.std_error, 3) for t in terms],
-                *[p_value(t.p_value) for t in terms],
-            ]
-        )
-    note = "; ".join(
-        f"{level}: {_summary(r)}" for level, r in zip(levels, regressions, strict=True)
+    whats = ("coefficient", "std error", "p value")
+    rows = [
+        [terms[0].name]
+        + [number(t.coefficient, 5) for t in terms]
+        + [number(t.std_error, 3) for t in terms]
+        + [p_value(t.p_value) for t in terms]
+        for terms in zip(*(regression.terms for regression in regressions), strict=True)
+    ]
+    said = (f"{level}: {_summary(r)}" for level, r in zip(levels, regressions, strict=True))
+    return Table(
+        "Fy from six regressors at each camber (Table 4-2)",
+        ["term", *(f"{what}, {level}" for what in whats for level in levels)],
+        rows,
+        note="; ".join(said),
     )
-    return Table("Fy from six regressors at each camber (Table 4-2)", columns, rows, note=note)
 
 
 def models(trained: Trained) -> dict[str, Polynomial]:
@@ -142,77 +139,81 @@ def _same(regression: Regression, quantity: str) -> bool:
 
 def estimator_tables(trained: Trained) -> list[Table]:
     """Return coefficients, regressors and candidates of every estimator in use, folded."""
-    tables = []
-    for quantity, model in models(trained).items():
-        name, unit, factor = TITLE[quantity], UNIT[quantity], FACTOR[quantity]
-        if quantity == "kappa":
-            name, unit, factor = "effective rolling radius (for the slip ratio)", "mm", 1e3
-        std = np.sqrt(np.diag(model.covariance))
-        tables.append(
-            Table(
-                f"{name}: {len(model.terms)} terms",
-                ("term", f"coefficient [{unit}]", f"std [{unit}]"),
-                [
-                    (term, number(factor * b, 5), number(factor * s, 3))
-                    for term, b, s in zip(model.names(), model.coefficients, std, strict=True)
-                ],
-                note=f"Regressors are standardised, (x {DASH} centre) / scale. Residual of the "
-                f"polynomial: {number(factor * model.residual)} {unit}; scatter of one turn about "
-                f"the mean of its run: {number(factor * model.floor)} {unit}.",
-                folded=True,
-            )
+    return [
+        table
+        for quantity, model in models(trained).items()
+        for table in (
+            _coefficients(quantity, model),
+            _regressors(trained, quantity, model),
+            _candidates(trained, quantity, model),
         )
-        tables.append(_regressors(trained, quantity, name, model))
-        tables.append(_candidates(trained, quantity, name, model))
-    return tables
-
-
-def _regressors(trained: Trained, quantity: str, name: str, model: Polynomial) -> Table:
-    guards = trained.calibration.chains[-1].guards.get(quantity, ())
-    rows = [
-        (v.name, REGRESSOR_UNIT.get(v.name, "1"), number(v.centre, 5), number(v.scale, 5), "", "")
-        for v in model.variables
     ]
-    known = {v.name: i for i, v in enumerate(model.variables)}
-    for guard in guards:
-        limits = (number(guard.low - guard.slack), number(guard.high + guard.slack))
-        unit = REGRESSOR_UNIT.get(guard.name, "1")
-        if guard.name in known:
-            rows[known[guard.name]] = (*rows[known[guard.name]][:4], *limits)
-        else:
-            rows.append((guard.name, unit, DASH, DASH, *limits))
+
+
+def _name(quantity: str) -> tuple[str, str, float]:
+    """Return name, unit and factor from SI of what the polynomial of a quantity gives."""
+    if quantity == "kappa":
+        return "effective rolling radius (for the slip ratio)", "mm", 1e3
+    return TITLE[quantity], UNIT[quantity], FACTOR[quantity]
+
+
+def _coefficients(quantity: str, model: Polynomial) -> Table:
+    name, unit, factor = _name(quantity)
+    std = np.sqrt(np.diag(model.covariance))
     return Table(
-        f"{name}: regressors and their valid ranges",
+        f"{name}: {len(model.terms)} terms",
+        ("term", f"coefficient [{unit}]", f"std [{unit}]"),
+        [
+            (term, number(factor * b, 5), number(factor * s, 3))
+            for term, b, s in zip(model.names(), model.coefficients, std, strict=True)
+        ],
+        note=f"Regressors are standardised, (x {DASH} centre) / scale. Residual of the "
+        f"polynomial: {number(factor * model.residual)} {unit}; scatter of one turn about the "
+        f"mean of its run: {number(factor * model.floor)} {unit}.",
+        folded=True,
+    )
+
+
+def _regressors(trained: Trained, quantity: str, model: Polynomial) -> Table:
+    scales = {v.name: (number(v.centre, 5), number(v.scale, 5)) for v in model.variables}
+    limits = {
+        guard.name: (number(guard.low - guard.slack), number(guard.high + guard.slack))
+        for guard in trained.calibration.chains[-1].guards.get(quantity, ())
+    }
+    return Table(
+        f"{_name(quantity)[0]}: regressors and their valid ranges",
         ("regressor", "SI unit", "centre", "scale", "valid from", "to"),
-        rows,
+        [
+            (
+                name,
+                REGRESSOR_UNIT.get(name, "1"),
+                *scales.get(name, (DASH, DASH)),
+                *limits.get(name, ("", "")),
+            )
+            for name in scales | limits
+        ],
         texts=2,
         folded=True,
     )
 
 
-def _candidates(trained: Trained, quantity: str, name: str, model: Polynomial) -> Table:
-    tried = trained.links.candidates[quantity]
-    factor, unit = FACTOR[quantity], UNIT[quantity]
-    if quantity == "kappa":
-        factor, unit = 1e3, "mm of radius"
-    fitting = [score for terms, score in tried if terms == len(model.terms)]
-    best = min(fitting) if fitting else float("nan")
-    note = "The error is weighted: it counts less where the cornering curve is flat." * (
-        quantity == "alpha"
-    )
-    return Table(
+def _candidates(trained: Trained, quantity: str, model: Polynomial) -> Table:
+    tried, count = trained.links.candidates[quantity], len(model.terms)
+    name, unit, factor = _name(quantity)
+    best = min((score for terms, score in tried if terms == count), default=float("nan"))
+    note = "The error is weighted: it counts less where the cornering curve is flat."
+    return Table.of(
         f"{name}: candidate estimators",
-        ("terms", f"held-out error [{unit}]", ""),
-        [
-            (
-                str(terms),
-                number(factor * score),
-                "in use" if terms == len(model.terms) and score == best else "",
-            )
-            for terms, score in tried
-        ],
+        tried,
+        {
+            "terms": lambda each: str(each[0]),
+            f"held-out error [{unit}{' of radius' if quantity == 'kappa' else ''}]": (
+                lambda each: number(factor * each[1])
+            ),
+            "": lambda each: "in use" if each == (count, best) else "",
+        },
         texts=0,
-        note=note,
+        note=note if quantity == "alpha" else "",
         folded=True,
     )
 
