@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from tirelib.report.parts_page import write_parts_page
+from tirelib.report.page import write_parts_page
 
 Found = TypeVar("Found")
 

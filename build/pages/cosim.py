@@ -11,8 +11,7 @@ from plotly.subplots import make_subplots
 
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.report.figures.compare_plot import Plot, styled_figure
-from tirelib.report.page import DASH, Part, Table, number
-from tirelib.report.parts_page import write_parts_page
+from tirelib.report.page import DASH, Part, Table, number, write_parts_page
 from tirelib.report.style import BLUE, FAINT, INK, ORANGE, RED
 
 TITLE = "Estimates in vehicle co-simulations"

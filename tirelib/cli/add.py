@@ -170,7 +170,7 @@ def write_step(
 ) -> None:
     """Write the model after a step, the step's page and its numbers; say where they are."""
     from tirelib.core.parameters import write_tire
-    from tirelib.report.extension import write_extension
+    from tirelib.report.journey import write_extension
 
     write_tire(new, out, FORMAT)
     console = output()

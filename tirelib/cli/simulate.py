@@ -267,7 +267,7 @@ def _document(
 
 
 def _write(done: Simulation, name: str, folder: Path) -> list[Path]:
-    from tirelib.report.figures.ring_simulation import figure_simulation
+    from tirelib.report.figures.ring_panels import figure_simulation
     from tirelib.report.style import save
 
     curves = folder / "simulation.csv"

@@ -12,12 +12,10 @@ from tirelib.inference.diagnose.forces.assess import ForceAssessment
 from tirelib.report.comparison import BRUSH, METHOD, RING
 from tirelib.report.error_sentences import fold_name
 from tirelib.report.explanation import STANDS_OUT, mark_of, stands, titled
+from tirelib.report.figures.before_after import Step, waterfall, waterfall_of
 from tirelib.report.figures.compare_plot import Plot, styled_figure
-from tirelib.report.figures.force_left import force_maps
-from tirelib.report.figures.strain_left import strain_maps
-from tirelib.report.figures.waterfall import Step, waterfall, waterfall_of
-from tirelib.report.page import Part, Table, number, numbers, unit_name
-from tirelib.report.parts_page import write_parts_page
+from tirelib.report.figures.left import force_maps, strain_maps
+from tirelib.report.page import Part, Table, number, numbers, unit_name, write_parts_page
 from tirelib.report.style import BLUE, FAINT, INK, RED
 
 TITLE = "Which effect is missing"

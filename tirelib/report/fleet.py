@@ -14,8 +14,7 @@ import plotly.graph_objects as go
 from markupsafe import Markup
 
 from tirelib.report.figures.compare_plot import Plot, dots, level_line, styled_figure
-from tirelib.report.page import DASH, Part, Table, number
-from tirelib.report.parts_page import write_parts_page
+from tirelib.report.page import DASH, Part, Table, number, write_parts_page
 from tirelib.report.style import BLUE, FAINT, ORANGE, RED
 
 MOST_ROWS = 200

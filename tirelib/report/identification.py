@@ -9,8 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from tirelib.report.figures.compare_plot import DIVERGING, Plot, styled_figure
-from tirelib.report.page import DASH, Table, number
-from tirelib.report.parts_page import Part, write_parts_page
+from tirelib.report.page import DASH, Part, Table, number, write_parts_page
 from tirelib.report.style import BLUE, FAINT, RED
 
 TITLE = "What the campaign says of the tire"

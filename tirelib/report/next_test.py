@@ -12,8 +12,7 @@ from tirelib.inference.planning.criterion import NOTHING, NextTest, PairForecast
 from tirelib.inference.planning.document import PROMISING, STRUCTURE, Plan, advice, plan_document
 from tirelib.inference.planning.envelope import AXES
 from tirelib.report.figures.compare_plot import Plot, dots, line, styled_figure
-from tirelib.report.page import Part, Table, number, numbers
-from tirelib.report.parts_page import write_parts_page
+from tirelib.report.page import Part, Table, number, numbers, write_parts_page
 from tirelib.report.style import BLUE, FAINT, RED
 
 TITLE = "Which run to measure next"

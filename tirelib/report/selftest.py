@@ -8,8 +8,7 @@ import plotly.graph_objects as go
 
 from tirelib.report.diagnosis import dead_effects
 from tirelib.report.figures.compare_plot import Plot, styled_figure
-from tirelib.report.page import DASH, Part, Table, number
-from tirelib.report.parts_page import write_parts_page
+from tirelib.report.page import DASH, Part, Table, number, write_parts_page
 
 TITLE = "Effects that this plan can find"
 

@@ -24,10 +24,12 @@ from tirelib.physics.contact.tread import Tread
 from tirelib.physics.ring.compliance import Compliance, compliance
 from tirelib.physics.ring.ring import ComplexArray, Ring
 from tirelib.physics.strain.innerliner import strain_harmonics
-from tirelib.report.simulation_peaks import Peaks, extreme, find_peaks
 from tirelib.report.simulation_series import (
     FINE_ANGLES_PER_ANGLE,
     N_SERIES,
+    Peaks,
+    extreme,
+    find_peaks,
     fine_grid,
     long_series,
     modes,

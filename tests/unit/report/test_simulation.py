@@ -14,7 +14,7 @@ from tirelib.core.errors import FormatError, ParameterError
 from tirelib.core.parameters import Tire, read_tire
 from tirelib.report.simulation import LARGEST_BELT_SPEED, Simulation, simulate
 from tirelib.report.simulation_document import columns, point_document, write_curves
-from tirelib.report.simulation_peaks import extreme
+from tirelib.report.simulation_series import extreme
 
 TIRE = read_tire("table-6-1").tire
 CONTACTS = pytest.mark.parametrize("contact", ["radial", "shear"])

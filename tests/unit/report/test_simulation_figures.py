@@ -16,7 +16,7 @@ from ring_figures import loads as over_load
 
 from tests.unit.report.test_report_figures import UNIT, label_of, with_data
 from tirelib.core.parameters import read_tire
-from tirelib.report.figures import ring_panels, ring_simulation
+from tirelib.report.figures import ring_panels
 from tirelib.report.simulation import Simulation, simulate
 
 A, B = (read_tire(name).tire for name in ("table-6-1", "table-6-2-195-65r15"))
@@ -66,7 +66,7 @@ DRAW: dict[str, Callable[[], Figure]] = {
     "6_35": lambda: over_load.figure_6_35(inflations()),
     "6_36": lambda: over_load.figure_6_36(pressed("shear")),
     "6_40": lambda: lateral.figure_6_40(loads()),
-    "simulation": lambda: ring_simulation.figure_simulation(loads(), "Table 6-2"),
+    "simulation": lambda: ring_panels.figure_simulation(loads(), "Table 6-2"),
 }
 NO_ANGLE = {"6_33", "6_40"}
 """Figures over speed and over x."""

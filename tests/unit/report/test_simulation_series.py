@@ -6,10 +6,10 @@ import pytest
 from tirelib.core.parameters import read_tire
 from tirelib.report import simulation, simulation_series
 from tirelib.report.simulation import simulate
-from tirelib.report.simulation_peaks import Peaks
 from tirelib.report.simulation_series import (
     LEAST_MODES,
     MOST_MODES,
+    Peaks,
     bending_length,
     fine_grid,
     modes,

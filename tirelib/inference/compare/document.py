@@ -13,8 +13,7 @@ from tirelib.inference.compare.sectors import Cell
 from tirelib.inference.compare.sentences import place
 from tirelib.inference.compare.set_points import NAMES
 from tirelib.inference.compare.strain import Comparison
-from tirelib.inference.compare.track_words import track_fit
-from tirelib.inference.compare.tracks import Track
+from tirelib.inference.compare.tracks import Track, track_fit
 
 FORMAT = "tirelib-comparison/1"
 

@@ -13,21 +13,24 @@ differences (`tirelib.inference.identify.noise`). A model does not change it. Wi
 unit is microstrain, and the error is the rms residual after the delay has been fitted.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy import linalg
 
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.effects.state import Operating
-from tirelib.inference.compare.lag import fitted_delay, late_prediction
 from tirelib.inference.compare.model import Prediction, TireModel, predict_runs
 from tirelib.inference.compare.set_points import predict_set_points, tangents
 from tirelib.inference.identify.campaign_data import StraightRuns
+from tirelib.inference.identify.delay import STD, UNIT, by_delay, earlier
+from tirelib.inference.identify.discrepancy import Discrepancy
 from tirelib.inference.identify.noise import LEAST_NOISE
-from tirelib.inference.identify.random_effects import Whitening, scales, whitening_of
+from tirelib.inference.identify.random_effects import Whitening, angle_slope, scales, whitening_of
 from tirelib.measured.signal import LowPass
+from tirelib.measured.waveforms import GRID
 from tirelib.model.base import operating_points
 from tirelib.physics.rolling.solve import Start
 
@@ -221,3 +224,146 @@ def named_errors(before: ModelError, after: ModelError) -> Mapping[str, Any]:
 
 def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
+
+
+PASSES = 3
+SEEN = 3.0
+"""Standard deviations of a delay from which it is reported."""
+
+
+def fitted_delay(
+    measured: FloatArray,
+    predicted: FloatArray,
+    omega: FloatArray,
+    whiten: Whitening,
+    independent: float,
+) -> tuple[float, float]:
+    """Return the delay [s] and its standard deviation, by what of it goes with the speed.
+
+    A zero of the wheel angle that is the same in all runs stands beside it, free: at one speed it
+    is all, and no delay is reported. Damping of the sidewall or sliding comes late as well: a
+    little of them goes with it.
+
+    Parameters
+    ----------
+    measured, predicted : shape (n_runs, n_phi), [-]
+    omega : shape (n_runs,), [rad/s]
+    whiten : Whitening
+        By set points and what a good model leaves.
+    independent : float
+        Samples in a turn of what is left that tell something of their own.
+    """
+    delay, information = 0.0, np.eye(2)
+    share = independent / measured.shape[1]
+    prior = np.array([(UNIT / STD) ** 2, 0.0])
+    for _ in range(PASSES):
+        late = earlier(predicted, omega, -delay)
+        slopes = np.stack([by_delay(late, omega), angle_slope(late)])
+        rows = whiten(slopes).reshape(2, -1)
+        rest = whiten(measured - late).ravel()
+        information = share * rows @ rows.T + np.diag(prior)
+        # the prior holds the whole delay near zero, not the step
+        gain = share * rows @ rest - prior * np.array([delay / UNIT, 0.0])
+        delay += UNIT * float(np.linalg.solve(information, gain)[0])
+    return delay, UNIT * float(np.sqrt(np.linalg.inv(information)[0, 0]))
+
+
+def late_prediction(prediction: Prediction, omega: FloatArray, delay: float) -> Prediction:
+    """Return what gages that come later by a delay show."""
+
+    def late(waves: FloatArray) -> FloatArray:
+        return earlier(waves, omega, -delay)
+
+    gages = prediction.gages
+    return replace(
+        prediction,
+        strain=late(prediction.strain),
+        gages=np.stack([late(gages[:, k]) for k in range(gages.shape[1])], axis=1),
+        by_load=late(prediction.by_load),
+        by_pressure=late(prediction.by_pressure),
+    )
+
+
+def lag_message(delay: float, std: float, omega: FloatArray) -> tuple[str, ...]:
+    """Say a delay that is more than chance."""
+    if abs(delay) < SEEN * std:
+        return ()
+    side = "after" if delay > 0.0 else "before"
+    turn = np.rad2deg(abs(delay) * float(np.max(np.abs(omega))))
+    return (
+        f"The gages come {1e6 * abs(delay):.0f} microseconds {side} the trigger in all runs "
+        f"({turn:.2g} deg of the wheel in the fastest): it is counted out of all errors. Effects "
+        "that act late as well are weighed against it by `tirelib diagnose`.",
+    )
+
+
+LEAST_ERROR = 1.1
+"""Error from which there is a misfit to be shared out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """Structural floor as far as known, in units of the noise.
+
+    Attributes
+    ----------
+    value : float
+        Part of the error that noise and the tire's structure explained when the model was last
+        changed on these data (`tirelib.inference.diagnose.floor`); NaN where its history does not
+        say.
+    smooth : float
+        Error that stays when a smooth misfit of angle, load and pressure is taken out: no change
+        of the model that acts smoothly can go below. NaN without noise.
+    share : float
+        Part of the excess error^2 - 1 that the smooth misfit explains; NaN for an error near 1.
+    """
+
+    value: float
+    smooth: float
+    share: float
+
+
+def floor_of(model: TireModel, data_hash: str, error: ModelError, points: Operating) -> Floor:
+    """Return what is known of the floor.
+
+    Parameters
+    ----------
+    data_hash : str
+        Hash of the campaign: a floor on other data is none here.
+    error : ModelError
+        Error on the counted runs.
+    points : Operating
+        The same runs.
+    """
+    smooth, share = float("nan"), float("nan")
+    if error.whiten is not None:
+        smooth = _without_smooth(error.rest, error.prediction, points, error.whiten)
+        if error.value > LEAST_ERROR:
+            share = (error.value**2 - smooth**2) / (error.value**2 - 1.0)
+    return Floor(last_floor(model.history, "strain", data_hash), smooth, share)
+
+
+def last_floor(history: Sequence[Mapping[str, Any]], quantity: str, data_hash: str) -> float:
+    """Return the floor in noise units by the last change for a quantity.
+
+    NaN where the history does not say it, or says it of other data.
+    """
+    told = [entry for entry in history if entry.get("quantity", "strain") == quantity]
+    if not told or told[-1].get("data_sha256") != data_hash:
+        return float("nan")
+    value = told[-1].get("floor")
+    return float(value) if isinstance(value, int | float) else float("nan")
+
+
+def _without_smooth(
+    rest: FloatArray, prediction: Prediction, points: Operating, whiten: Whitening
+) -> float:
+    """Return the error with a smooth misfit taken out."""
+    half = 0.5 * (prediction.edges[:, 1] - prediction.edges[:, 0])
+    shapes = Discrepancy().columns(prediction.strain, half, points, GRID)
+    rows = whiten(shapes).reshape(len(shapes), -1)
+    white = whiten(rest).ravel()
+    normal = rows @ rows.T + np.eye(len(rows))
+    weights = linalg.cho_solve(linalg.cho_factor(normal), rows @ white)
+    left = white - weights @ rows
+    return float(np.sqrt(np.mean(left**2)))

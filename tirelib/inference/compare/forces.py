@@ -18,7 +18,7 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.parameters import TireFile
 from tirelib.core.quantities import QUANTITIES
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.inference.compare.floor import last_floor
+from tirelib.inference.compare.error import last_floor
 from tirelib.inference.compare.force_model import (
     ForceModel,
     force_model_of,

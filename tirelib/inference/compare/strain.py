@@ -6,18 +6,22 @@ import numpy as np
 from scipy import special
 
 from tirelib.core.arrays import FloatArray, IntArray
-from tirelib.inference.compare.error import ModelError, Yardstick
-from tirelib.inference.compare.floor import Floor, floor_of
+from tirelib.inference.compare.error import (
+    Floor,
+    ModelError,
+    Yardstick,
+    floor_of,
+    lag_message,
+    late_prediction,
+)
 from tirelib.inference.compare.gages import Gage, compare_gages, gage_sentences
-from tirelib.inference.compare.lag import lag_message, late_prediction
 from tirelib.inference.compare.model import Prediction, TireModel, predict_runs
 from tirelib.inference.compare.regions import SLIPS, Region, find_regions
 from tirelib.inference.compare.runs import Chosen, choose
 from tirelib.inference.compare.sectors import Cell, cells, sectors_of
 from tirelib.inference.compare.sentences import sentences
 from tirelib.inference.compare.set_points import NAMES, SetPoints, predict_set_points, tangents
-from tirelib.inference.compare.track_words import track_sentences
-from tirelib.inference.compare.tracks import Track, tracks
+from tirelib.inference.compare.tracks import Track, track_sentences, tracks
 from tirelib.inference.identify.campaign_data import straight_noise
 from tirelib.inference.identify.noise import RepeatNoise
 from tirelib.inference.identify.random_effects import scales

@@ -1,13 +1,18 @@
-"""Estimated against measured with 95 % intervals: each quantity, and turn by turn (Fig. 4-8)."""
+"""Estimates against measurements: by quantity, turn by turn (Fig. 4-8), and their residuals."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from scipy.special import ndtri
 
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError
 from tirelib.estimators.estimate import Estimates
+from tirelib.estimators.train import Trained
 from tirelib.measured.observations import Observations
 from tirelib.report.accuracy import (
     QUANTITIES,
@@ -19,7 +24,16 @@ from tirelib.report.accuracy import (
     accuracy,
     compare,
 )
-from tirelib.report.figures.regression import ANGLE, RESIDUAL, largest, residual_panel, rms
+from tirelib.report.figures.regression import (
+    ANGLE,
+    RESIDUAL,
+    find_regression,
+    in_use,
+    largest,
+    residual_panel,
+    rms,
+    scatter_levels,
+)
 from tirelib.report.levels import load_levels
 from tirelib.report.style import (
     BLACK,
@@ -118,3 +132,89 @@ def figure_4_8(observations: Observations, estimates: Estimates) -> Figure:
     lower.grid(visible=False, axis="x")
     legend_below(figure, [upper], columns=6)
     return figure
+
+
+DISSERTATION = {"Fz": "Fig. 4-4", "alpha": "Fig. 4-7", "Fy": "Table 4-1"}
+"""The dissertation's regression of each quantity."""
+
+
+@styled
+def figure_residuals(trained: Trained, quantity: str) -> Figure:
+    """Held-out residuals of the estimator in use; below, those of the dissertation's regression.
+
+    Each row has a scale of its own, so that a pattern shows.
+
+    Raises
+    ------
+    CalibrationError
+        If the quantity was not calibrated.
+    """
+    held = in_use(trained, quantity)
+    if held is None:
+        reason = trained.links.refused.get(quantity, "no reason is known")
+        raise CalibrationError(f"residuals of {quantity}: it is not calibrated: {reason}")
+    measured, estimated = held
+    truth = trained.links.truth
+    rows = [
+        _Residuals(
+            "in use, held out",
+            estimated,
+            truth["Fz"],
+            np.rad2deg(truth["slip_angle"]),
+            measured - estimated,
+        )
+    ]
+    old = find_regression(trained, DISSERTATION.get(quantity, ""))
+    if old is not None:
+        means, use = trained.means, old.rows
+        rows.append(
+            _Residuals(
+                f"dissertation, {old.source}",
+                old.fitted,
+                means.load[use],
+                means.slip_angle[use],
+                old.measured - old.fitted,
+            )
+        )
+    figure = new_figure(13.0, 0.7 + 3.5 * len(rows))
+    grid = figure.subplots(len(rows), 4, width_ratios=(1, 1, 1, 0.9), squeeze=False)
+    for panels, row in zip(grid, rows, strict=True):
+        _draw_residuals(list(panels), row, quantity)
+    legend_below(figure, [grid[0, 0]], columns=7)
+    return figure
+
+
+@dataclass(frozen=True, slots=True)
+class _Residuals:
+    """One row of the figure; arrays of shape (n,), as drawn."""
+
+    name: str
+    estimated: FloatArray
+    load: FloatArray
+    angle: FloatArray
+    error: FloatArray
+
+
+def _draw_residuals(panels: list[Axes], row: _Residuals, quantity: str) -> None:
+    unit, name, error = UNIT[quantity], TITLE[quantity], row.error
+    levels = load_levels(row.load)
+    across = (
+        (row.estimated, label(f"estimated {name}", unit, signed=quantity in SIGNED)),
+        (row.load, label("measured vertical load Fz", "N")),
+        (row.angle, label("measured slip angle", "deg", signed=True)),
+    )
+    for axes, (x, text) in zip(panels, across, strict=False):
+        scatter_levels(axes, x, error, levels)
+        residual_panel(axes, largest(error))
+        axes.set_xlabel(text)
+    panels[0].set_ylabel(label(RESIDUAL, unit))
+    for axes in panels[1:3]:
+        axes.sharey(panels[0])
+        axes.tick_params(labelleft=False)
+    place = ndtri((np.arange(error.size) + 0.5) / error.size)
+    panels[3].plot(place, np.sort(error), "o", markersize=3.5, color="#333333")
+    panels[3].plot(place, place * float(np.std(error)), color=FAINT, linewidth=1.0)
+    panels[3].set_title("against a normal law")
+    panels[3].set_xlabel("normal quantile [-]")
+    panels[3].set_ylabel(label(RESIDUAL, unit))
+    panels[0].set_title(f"{name[0].upper()}{name[1:]}, {row.name}: rms {rms(error):.3g} {unit}")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tirelib.inference.compare.document import comparison_document
-from tirelib.inference.compare.floor import last_floor
+from tirelib.inference.compare.error import last_floor
 from tirelib.inference.compare.force_curves import curves_of, ranked
 from tirelib.inference.compare.forces import ForceComparison
 from tirelib.inference.identify.force_data import ForceData

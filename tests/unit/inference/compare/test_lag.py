@@ -7,7 +7,7 @@ import pytest
 
 from tests.unit.inference.compare.compare_synthetic import model_file, waveforms
 from tirelib.core.arrays import FloatArray
-from tirelib.inference.compare.lag import fitted_delay
+from tirelib.inference.compare.error import fitted_delay
 from tirelib.inference.compare.model import model_of
 from tirelib.inference.compare.strain import Comparison, compare_strain
 from tirelib.inference.identify.delay import STD, earlier

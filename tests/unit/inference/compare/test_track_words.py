@@ -9,8 +9,13 @@ from tests.unit.inference.compare.compare_synthetic import ANGLE, model_file, wa
 from tirelib.inference.compare.model import model_of
 from tirelib.inference.compare.runs import Factor
 from tirelib.inference.compare.strain import compare_strain
-from tirelib.inference.compare.track_words import track_fit, track_sentences
-from tirelib.inference.compare.tracks import Track, contact_edges, pooled
+from tirelib.inference.compare.tracks import (
+    Track,
+    contact_edges,
+    pooled,
+    track_fit,
+    track_sentences,
+)
 from tirelib.measured.waveforms import GRID
 
 LOADS = np.repeat([1500.0, 3000.0, 4500.0, 6000.0], 6)

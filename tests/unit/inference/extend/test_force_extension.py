@@ -22,7 +22,7 @@ from tirelib.inference.extend.force_extension import (
 )
 from tirelib.inference.extend.model_file import undone_file
 from tirelib.journey import add
-from tirelib.report.figures.waterfall import waterfall_of
+from tirelib.report.figures.before_after import waterfall_of
 
 EFFECT, SLOPE = CATALOGUE["friction_load"], 0.25
 

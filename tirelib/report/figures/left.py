@@ -1,14 +1,47 @@
-"""Map of a force's residual after the brush fit: slip over conditions."""
+"""Maps of what a diagnosed model leaves: of strain over the turn, of a force over its slip."""
 
 import numpy as np
 
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.quantities import QUANTITIES
+from tirelib.inference.diagnose.document import Assessment
 from tirelib.inference.diagnose.forces.assess import ForceAssessment
 from tirelib.inference.diagnose.forces.fit import ForceFit
+from tirelib.inference.diagnose.left import Left, left_of
 from tirelib.inference.identify.error_bands import levels
 from tirelib.inference.problems.force_plan import varies
-from tirelib.report.figures.compare_plot import Plot, heat, limit_of, ticks
+from tirelib.report.figures.compare_plot import DEGREES, Plot, heat, limit_of, ticks, turn_map
+from tirelib.report.page import unit_name
+
+
+def strain_maps(found: Assessment) -> list[Plot]:
+    """Return the map without the named effects and, where there are some, with them."""
+    before = left_of(found.refitted, found.diagnosis.problem.data.points)
+    maps = [_turns(found, before, "before", "Without the named effects")]
+    if found.named:
+        maps.append(_turns(found, found.left, "after", f"With {', '.join(found.named)}"))
+    return maps
+
+
+def _turns(found: Assessment, left: Left, name: str, title: str) -> Plot:
+    points, run = found.diagnosis.problem.data.points, found.diagnosis.runs.waves.run
+    order = np.lexsort((points.speed, points.pressure, np.round(points.load, -2)))
+    data, unit = left.white[order], unit_name(found.after.unit)
+    labels = [f"run {run[k]}: {points.load[k]:.0f} N" for k in order]
+    figure = turn_map(data, unit, 480, limit=limit_of(found.refitted.white_of(found.refitted.rest)))
+    marks = range(0, len(order), max(1, len(order) // 10))
+    ticks(figure, marks, [labels[k] for k in marks], "runs, by load [N]")
+    columns = zip((f"{label} [{unit}]" for label in labels), data, strict=True)
+    return Plot.of(
+        f"residual-{name}",
+        title,
+        "Model minus measurement, with set-point errors weighted down as in the fit. One colour "
+        "scale for both maps. Red: the model shows too much tension; blue: too much compression.",
+        figure,
+        [("wheel angle [deg]", DEGREES), *columns],
+        3,
+    )
+
 
 DIGITS = {"load": ",.0f", "pressure": ".2f", "camber": ".1f", "speed": ".0f"}
 """How the set point of a condition is said."""
@@ -17,13 +50,13 @@ _BINS = 24
 
 def force_maps(found: ForceAssessment) -> list[Plot]:
     """Return the map without the named effects and, where there are some, with them."""
-    maps = [_map(found, found.diagnosis.base, "before", "Without the named effects")]
+    maps = [_slips(found, found.diagnosis.base, "before", "Without the named effects")]
     if found.named:
-        maps.append(_map(found, found.final, "after", f"With {', '.join(found.named)}"))
+        maps.append(_slips(found, found.final, "after", f"With {', '.join(found.named)}"))
     return maps
 
 
-def _map(assessment: ForceAssessment, model: ForceFit, name: str, title: str) -> Plot:
+def _slips(assessment: ForceAssessment, model: ForceFit, name: str, title: str) -> Plot:
     """Return the mean of model less measured by slip and by set point of the other conditions."""
     case = assessment.case
     at, unit = case.problem.bench.conditions, case.unit
