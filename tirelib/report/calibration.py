@@ -1,10 +1,12 @@
 """The report of a calibration: statistics, residuals, cross-validation, and what is missing."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from tirelib.core.errors import CalibrationError
 from tirelib.estimators.cornering import CorneringTrend
@@ -103,89 +105,92 @@ def _residuals(trained: Trained) -> list[Drawing]:
             f"Residuals of the {TITLE[quantity]}",
             "Against the estimate, the load and the slip angle; right: compared with a normal "
             "distribution. Each row has its own scale.",
-            lambda quantity=quantity: figures.figure_residuals(trained, quantity),  # type: ignore[misc]
+            partial(figures.figure_residuals, trained, quantity),
         )
         for quantity in QUANTITIES
         if quantity in trained.links.held_out
     ]
 
 
+_FIGURES: tuple[tuple[str, str, str, Callable[[Trained], Figure]], ...] = (
+    (
+        "4-3",
+        "Contact length over slip angle",
+        "The off-centre lengths follow the slip angle. The centre length hardly does, so it "
+        "indicates the load.",
+        lambda trained: figures.figure_4_3(trained.means),
+    ),
+    (
+        "4-4",
+        "Load from the centre contact length",
+        "Left: the quadratic; middle: its residuals; right: held-out residuals of the estimator "
+        "in use, on the same scale.",
+        figures.figure_4_4,
+    ),
+    (
+        "4-5",
+        "Slip angle from the in/out ratio of peak rates",
+        "Thin lines are fits to one load each: the ratio also depends on the load.",
+        figures.figure_4_5,
+    ),
+    (
+        "4-7",
+        "Slip angle from the slope of peak rates",
+        "Thin lines are fits to one load each. Right: the estimator in use, held out, on the same "
+        "scale.",
+        figures.figure_4_7,
+    ),
+    (
+        "4-12",
+        "Lateral force by load",
+        "Left: the regression with six regressors; right: the estimator in use, held out; below: "
+        "their residuals.",
+        figures.figure_4_12,
+    ),
+    (
+        "4-14",
+        "Lateral force under camber",
+        "Six regressors fitted at each camber, one fit for all cambers, and the estimator in use.",
+        figures.figure_4_14,
+    ),
+    (
+        "4-20",
+        "Cornering curves",
+        "Run means, and the Magic Formula fitted to them.",
+        lambda trained: figures.figure_4_20(trained.means, _trend(trained)),
+    ),
+    (
+        "4-23",
+        "Cornering stiffness and peak force over contact length",
+        "Bars are 95 % intervals; a hollow ring is an extrapolated peak beyond the measured slip "
+        "angles.",
+        lambda trained: figures.figure_4_23(_trend(trained)),
+    ),
+)
+"""Number, title and caption of the figures of section 4.1, and how each is drawn."""
+
+
 def regression_drawings(trained: Trained) -> list[Drawing]:
     """Return the figures of section 4.1 that a calibration's data can inform."""
-    means = trained.means
-    drawings = [
+    cambers = any(r.source == "Table 4-2" for r in trained.regressions)
+    return [
         Drawing(
-            "figure_4_3",
-            "Contact length over slip angle (Fig. 4-3)",
-            "The off-centre lengths follow the slip angle. The centre length hardly does, so it "
-            "indicates the load.",
-            lambda: figures.figure_4_3(means),
-        ),
-        Drawing(
-            "figure_4_4",
-            "Load from the centre contact length (Fig. 4-4)",
-            "Left: the quadratic; middle: its residuals; right: held-out residuals of the "
-            "estimator in use, on the same scale.",
-            lambda: figures.figure_4_4(trained),
-        ),
-        Drawing(
-            "figure_4_5",
-            "Slip angle from the in/out ratio of peak rates (Fig. 4-5)",
-            "Thin lines are fits to one load each: the ratio also depends on the load.",
-            lambda: figures.figure_4_5(trained),
-        ),
-        Drawing(
-            "figure_4_7",
-            "Slip angle from the slope of peak rates (Fig. 4-7)",
-            "Thin lines are fits to one load each. Right: the estimator in use, held out, on the "
-            "same scale.",
-            lambda: figures.figure_4_7(trained),
-        ),
-        Drawing(
-            "figure_4_12",
-            "Lateral force by load (Fig. 4-12)",
-            "Left: the regression with six regressors; right: the estimator in use, held out; "
-            "below: their residuals.",
-            lambda: figures.figure_4_12(trained),
-        ),
+            f"figure_{number.replace('-', '_')}",
+            f"{title} (Fig. {number})",
+            caption,
+            partial(draw, trained),
+        )
+        for number, title, caption, draw in _FIGURES
+        if cambers or number != "4-14"
     ]
-    if any(r.source == "Table 4-2" for r in trained.regressions):
-        drawings.append(
-            Drawing(
-                "figure_4_14",
-                "Lateral force under camber (Fig. 4-14)",
-                "Six regressors fitted at each camber, one fit for all cambers, and the estimator "
-                "in use.",
-                lambda: figures.figure_4_14(trained),
-            )
-        )
-    trend = trained.cornering
-    drawings.append(
-        Drawing(
-            "figure_4_20",
-            "Cornering curves (Fig. 4-20)",
-            "Run means, and the Magic Formula fitted to them.",
-            lambda: figures.figure_4_20(means, _needed(trend)),
-        )
-    )
-    drawings.append(
-        Drawing(
-            "figure_4_23",
-            "Cornering stiffness and peak force over contact length (Fig. 4-23)",
-            "Bars are 95 % intervals; a hollow ring is an extrapolated peak beyond the measured "
-            "slip angles.",
-            lambda: figures.figure_4_23(_needed(trend)),
-        )
-    )
-    return drawings
 
 
-def _needed(trend: CorneringTrend | None) -> CorneringTrend:
-    if trend is None:
+def _trend(trained: Trained) -> CorneringTrend:
+    if trained.cornering is None:
         raise CalibrationError(
             "the figure needs three loads with at least six slip angles each, without camber"
         )
-    return trend
+    return trained.cornering
 
 
 __all__ = [

@@ -134,14 +134,8 @@ class Yardstick:
 
     def take(self, chosen: BoolArray) -> "Yardstick":
         """Return the yardstick of some of the runs; the unit stays."""
-        return Yardstick(
-            self.strain[chosen],
-            self.at.take(chosen),
-            self.scale[chosen],
-            self.noise,
-            self.lateral,
-            self.low_pass,
-        )
+        strain, scale = self.strain[chosen], self.scale[chosen]
+        return replace(self, strain=strain, at=self.at.take(chosen), scale=scale)
 
     @property
     def unit(self) -> str:

@@ -199,8 +199,7 @@ def _strain(found: Comparison) -> dict[str, Any]:
 def _strain_traces(found: Comparison) -> Callable[[Effect, tuple[float, ...]], FloatArray]:
     model, waves = found.model, found.chosen.waves
     at = operating_points(waves)
-    solve = _rolling if model.large else _linear
-    here, by, planted_on = solve(model, at, waves.low_pass)
+    here, by, planted_on = _solved(model, at, waves.low_pass)
     scale, spread = scales(found.chosen.tolerance, waves.angle_std), float(np.std(found.difference))
     tangent = found.points.tangent
     noise = found.noise.std if found.noise.known else spread
@@ -222,30 +221,24 @@ def _strain_traces(found: Comparison) -> Callable[[Effect, tuple[float, ...]], F
     return trace
 
 
-Solved = tuple[FloatArray, FloatArray, Callable[[Changes], FloatArray]]
-"""Waveforms, their slopes by the tire's numbers, and what waveforms other effects give."""
+def _solved(
+    model: TireModel, at: Operating, low_pass: LowPass
+) -> tuple[FloatArray, FloatArray, Callable[[Changes], FloatArray]]:
+    """Return waveforms, their slopes by the tire's numbers, and those that other effects give."""
+    values, free = model.values, coordinates(model.values)
+    if not model.large:
+        linear = linearised(values, at, free, model.changes, low_pass=low_pass)
 
+        def of_linear(changes: Changes) -> FloatArray:
+            return predict(values, at, changes, low_pass=low_pass).wave
 
-def _rolling(model: TireModel, at: Operating, low_pass: LowPass) -> Solved:
-    """Return the rolling ring with the model's effects."""
-    free = coordinates(model.values)
-    found = solved(model.values, at, model.changes, low_pass=low_pass)
+        return linear.waveform, linear.waveform_slopes, of_linear
+    found = solved(values, at, model.changes, low_pass=low_pass)
 
-    def planted(changes: Changes) -> FloatArray:
-        return solved(model.values, at, changes, low_pass=low_pass, start=found.rolling).waveform
+    def of_rolling(changes: Changes) -> FloatArray:
+        return solved(values, at, changes, low_pass=low_pass, start=found.rolling).waveform
 
-    return found.waveform, by_values(found, free).waveform[: len(free)], planted
-
-
-def _linear(model: TireModel, at: Operating, low_pass: LowPass) -> Solved:
-    """Return the linear ring with the model's effects."""
-    free = coordinates(model.values)
-    found = linearised(model.values, at, free, model.changes, low_pass=low_pass)
-
-    def planted(changes: Changes) -> FloatArray:
-        return predict(model.values, at, changes, low_pass=low_pass).wave
-
-    return found.waveform, found.waveform_slopes, planted
+    return found.waveform, by_values(found, free).waveform[: len(free)], of_rolling
 
 
 def _points(data: ForceData, quantity: str) -> dict[str, Any]:
