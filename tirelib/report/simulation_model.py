@@ -5,7 +5,8 @@ the linear one (`tirelib.model.solution`); the shear is that of the rolling ring
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -88,8 +89,8 @@ def simulate_file(
     if load is None:
         points = _at_deflection(model, values, points, target)
     found = _pressed(model, values, points)
-    curves = _of_rolling(found) if isinstance(found, Solution) else _of_linear(found)
-    return _simulation(tire, curves, found.deflection, points)
+    seen = _of_rolling(found) if isinstance(found, Solution) else _of_linear(found)
+    return _simulation(tire, *seen, found.deflection, points)
 
 
 def _check_known(model: TireModel, temperature: FloatArray) -> None:
@@ -142,9 +143,8 @@ def _at_deflection(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Curves:
-    """Curves (n_points, n) over `TURN`, and where the contact begins and ends, (n_points, 2)."""
+class _Curves(NamedTuple):
+    """Curves (n_points, n) over `TURN`: belt, tractions, strain, gage."""
 
     u: FloatArray
     v: FloatArray
@@ -153,41 +153,41 @@ class _Curves:
     along: FloatArray
     strain: FloatArray
     gage: FloatArray
-    edges: FloatArray
 
 
-def _of_linear(state: State) -> _Curves:
-    """Return the curves of the linear ring; its contact pushes along the belt's normal."""
+def _of_linear(state: State) -> tuple[_Curves, FloatArray]:
+    """Return curves and edges of the linear ring; its contact pushes along the belt's normal."""
     assert state.contact is not None  # noqa: S101 - the chain sets it
     assert state.belt is not None  # noqa: S101
     assert state.strain is not None  # noqa: S101
     u, v, strain = (_on_turn(h) for h in (state.belt[..., 0], state.belt[..., 1], state.strain))
     pressure = state.contact.pressure_at(TURN)
     up, along = pressure * np.cos(TURN), -pressure * np.sin(TURN)
-    return _Curves(u, v, pressure, up, along, strain, state.wave, state.contact.edges)
+    return _Curves(u, v, pressure, up, along, strain, state.wave), state.contact.edges
 
 
-def _of_rolling(found: Solution) -> _Curves:
-    """Return the curves of the rolling ring, with what the linear one adds."""
+def _of_rolling(found: Solution) -> tuple[_Curves, FloatArray]:
+    """Return curves and edges of the rolling ring, with what the linear one adds."""
     turn = found.rolling.on_turn(TURN.size)
     u, v, pressure, edges = turn.u, turn.v, turn.pressure, turn.edges
     strain = found.rolling.strain(found.made.gage, TURN.size)
     if found.linear is not None:
-        plain, added = (_of_linear(state) for state in found.linear)
+        (plain, was), (added, is_now) = (_of_linear(state) for state in found.linear)
         u, v, strain = u + added.u - plain.u, v + added.v - plain.v, strain - plain.strain
-        strain, edges = strain + added.strain, edges + added.edges - plain.edges
+        strain, edges = strain + added.strain, edges + is_now - was
         pressure = pressure + added.pressure - plain.pressure
         pressure = np.where(_inside(edges), np.maximum(pressure, 0.0), 0.0)
-    return _Curves(u, v, pressure, pressure, turn.shear, strain, found.waveform, edges)
+    return _Curves(u, v, pressure, pressure, turn.shear, strain, found.waveform), edges
 
 
 def _simulation(
-    tire: Tire, found: _Curves, deflection: FloatArray, points: Operating
+    tire: Tire, curves: _Curves, edges: FloatArray, deflection: FloatArray, points: Operating
 ) -> Simulation:
-    """Return the curves of a solved model."""
-    rate = _slope(found.strain)
-    closed = (found.u, found.v, found.pressure, found.up, found.along, found.strain, rate)
-    u, v, pressure, up, along, strain, rate = (_closed(x) for x in closed)
+    """Return the curves of a solved model, their first value at the end as well."""
+    u, v, pressure, up, along, strain, gage, rate = (
+        np.concatenate([x, x[:, :1]], axis=1) for x in (*curves, _slope(curves.strain))
+    )
+    middles = zip(edges.mean(axis=1), pressure, strict=True)
     return Simulation(
         tire,
         "radial",
@@ -195,8 +195,8 @@ def _simulation(
         points.omega,
         points.load,
         deflection,
-        found.edges,
-        _at_middle(pressure, found.edges),
+        edges,
+        np.array([np.interp(middle, PHI, q) for middle, q in middles]),
         tire.ring_radius * (pressure @ np.sin(PHI)) / (pressure @ np.cos(PHI)),
         PHI,
         u,
@@ -206,7 +206,7 @@ def _simulation(
         along,
         strain,
         rate,
-        gage=_closed(found.gage),
+        gage=gage,
     )
 
 
@@ -228,13 +228,3 @@ def _slope(values: FloatArray) -> FloatArray:
     order[-1] = 0.0
     out: FloatArray = np.fft.irfft(np.fft.rfft(values) * order, n=n)
     return out
-
-
-def _closed(values: FloatArray) -> FloatArray:
-    """Return curves with their first value at the end as well."""
-    return np.concatenate([values, values[:, :1]], axis=1)
-
-
-def _at_middle(pressure: FloatArray, edges: FloatArray) -> FloatArray:
-    middles = edges.mean(axis=1)
-    return np.array([np.interp(m, PHI, q) for m, q in zip(middles, pressure, strict=True)])

@@ -8,7 +8,7 @@ import numpy as np
 from tirelib.estimators.dissertation import Regression
 from tirelib.estimators.polynomial import Polynomial
 from tirelib.estimators.train import Trained
-from tirelib.report.accuracy import FACTOR, QUANTITIES, TITLE, UNIT
+from tirelib.report.accuracy import FACTOR, TITLE, UNIT
 from tirelib.report.figures.lateral_force import SMALL_ANGLE
 from tirelib.report.figures.regression import in_use, rms
 from tirelib.report.page import DASH, Table, number, p_value
@@ -90,42 +90,32 @@ def models(trained: Trained) -> dict[str, Polynomial]:
 def in_use_table(trained: Trained) -> Table:
     """Return one row per quantity: held-out error, R2, terms, and the dissertation's beside it."""
     rows = []
-    for quantity in QUANTITIES:
+    angle = trained.links.truth["slip_angle"]
+    for quantity, model in models(trained).items():
         held = in_use(trained, quantity)
-        model = models(trained).get(quantity)
-        if held is None or model is None:
+        if held is None:
             continue
-        measured, estimated = held
-        error = measured - estimated
-        small = np.abs(np.rad2deg(trained.links.truth["slip_angle"])) <= SMALL_ANGLE
+        measured, error = held[0], held[0] - held[1]
+        small = error[np.abs(np.rad2deg(angle)) <= SMALL_ANGLE] if quantity == "alpha" else None
         spread = float(np.sum((measured - measured.mean()) ** 2))
         r2 = 1.0 - float(np.sum(error**2)) / spread if spread > 0.0 else float("nan")
         old = [r.cross_validated for r in trained.regressions if _same(r, quantity)]
         rows.append(
-            (
-                TITLE[quantity],
-                UNIT[quantity],
-                number(rms(error)),
-                number(rms(error[small])) if quantity == "alpha" else DASH,
-                number(min(old)) if old else DASH,
-                f"{r2:.5f}",
-                str(error.size),
-                str(len(model.terms)),
-            )
+            {
+                "quantity": TITLE[quantity],
+                "unit": UNIT[quantity],
+                "held out": number(rms(error)),
+                f"up to {SMALL_ANGLE} deg": DASH if small is None else number(rms(small)),
+                "dissertation, held out": number(min(old)) if old else DASH,
+                "R\u00b2": f"{r2:.5f}",
+                "measurements": str(error.size),
+                "terms": str(len(model.terms)),
+            }
         )
     return Table(
         "Estimators in use: errors at held-out conditions",
-        (
-            "quantity",
-            "unit",
-            "held out",
-            f"up to {SMALL_ANGLE} deg",
-            "dissertation, held out",
-            "R\u00b2",
-            "measurements",
-            "terms",
-        ),
-        rows,
+        [*rows[0]] if rows else ["quantity"],
+        [[*row.values()] for row in rows],
         texts=2,
         note="Held out: each condition in turn is left out of the fit and then estimated. The "
         "dissertation's column is the best of its own regressions of the quantity, on the same "
