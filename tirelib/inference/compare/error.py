@@ -35,6 +35,11 @@ from tirelib.model.base import operating_points
 from tirelib.physics.rolling.solve import Start
 
 NOISE, MICROSTRAIN = "noise", "ustrain"
+PASSES = 3
+SEEN = 3.0
+"""Standard deviations of a delay from which it is reported."""
+LEAST_ERROR = 1.1
+"""Error from which there is a misfit to be shared out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,11 +225,6 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-PASSES = 3
-SEEN = 3.0
-"""Standard deviations of a delay from which it is reported."""
-
-
 def fitted_delay(
     measured: FloatArray,
     predicted: FloatArray,
@@ -289,10 +289,6 @@ def lag_message(delay: float, std: float, omega: FloatArray) -> tuple[str, ...]:
         f"({turn:.2g} deg of the wheel in the fastest): it is counted out of all errors. Effects "
         "that act late as well are weighed against it by `tirelib diagnose`.",
     )
-
-
-LEAST_ERROR = 1.1
-"""Error from which there is a misfit to be shared out."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,13 @@ from tirelib.measured.waveforms import GRID, Waveforms
 
 REACH = 0.8
 """Angle within which the contact's ends are looked for, [rad]."""
+WORDS = {
+    "contact length": ("long", "short"),
+    "deflection": ("large", "small"),
+    "contact entry": ("late", "early"),
+    "contact exit": ("late", "early"),
+}
+"""What a positive and a negative difference, model less measured, is called."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,15 +161,6 @@ def _peak(values: FloatArray, inside: BoolArray) -> FloatArray:
     shift = np.where(bend < 0.0, 0.5 * (before - after) / np.where(bend < 0.0, bend, -1.0), 0.0)
     step = GRID[1] - GRID[0]
     return np.asarray(GRID[index] + np.clip(shift, -0.5, 0.5) * step)
-
-
-WORDS = {
-    "contact length": ("long", "short"),
-    "deflection": ("large", "small"),
-    "contact entry": ("late", "early"),
-    "contact exit": ("late", "early"),
-}
-"""What a positive and a negative difference, model less measured, is called."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,9 +27,15 @@ NAMES = {name: quantity.title for name, quantity in QUANTITIES.items()} | {"gage
 SIGN = "Red: the model shows too much tension (too little compression); blue: too much compression."
 FEW = 12
 """Rows of a map up to which the pointer names the row."""
-_SLIPS = {"slip_angle": (" deg slip angle", 0.25), "camber": (" deg camber", 0.25)}
-_SLIPS["slip_ratio"] = (" slip ratio", 0.005)
+_SLIPS = {
+    "slip_angle": (" deg slip angle", 0.25),
+    "camber": (" deg camber", 0.25),
+    "slip_ratio": (" slip ratio", 0.005),
+}
 """How a run's slip is said, and from which size, in that unit."""
+HALF = 100.0
+"""Angles shown at first, [deg]; the rest by zooming out."""
+_UNIT = "microstrain"
 
 
 def heat_maps(found: Comparison) -> list[Plot]:
@@ -65,7 +71,7 @@ def unit_of(found: Comparison) -> tuple[float, str]:
 
 
 def place_of(found: Comparison, i: int) -> str:
-    """Say load, pressure and speed of a run."""
+    """Say pressure and speed of a run."""
     c = found.chosen.waves.conditions
     return f"{c['pressure'][i] / 1e5:.2f} bar, {c['speed'][i] * 3.6:.0f} km/h"
 
@@ -165,11 +171,6 @@ def _data(
     """Return the data, a row per angle and a column per level, and their decimals."""
     named = [f"{first} {text}: [{unit}]" for text in labels]
     return [("wheel angle [deg]", DEGREES), *zip(named, data, strict=True)], 4
-
-
-HALF = 100.0
-"""Angles shown at first, [deg]; the rest by zooming out."""
-_UNIT = "microstrain"
 
 
 def waveform_plots(found: Comparison) -> list[Plot]:

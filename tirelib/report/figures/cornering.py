@@ -27,6 +27,7 @@ from tirelib.report.style import (
 
 UNKNOWN_PEAK = 0.25
 """A peak force less certain than this share of itself was not reached by the measurement."""
+FEWEST_ANGLES = 3
 
 
 def bend_factor(angle: FloatArray, force: FloatArray, stiffness: float, peak: float) -> float:
@@ -135,9 +136,6 @@ def _trend(
     axes.plot([], [], color=FAINT, marker="_", linestyle="none", label="bars: 95 % interval")
     axes.set_xlabel(label("contact length of the centre gage", "mm"))
     axes.set_ylim(bottom=0.0)
-
-
-FEWEST_ANGLES = 3
 
 
 @styled

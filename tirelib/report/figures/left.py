@@ -13,6 +13,10 @@ from tirelib.inference.problems.force_plan import varies
 from tirelib.report.figures.compare_plot import DEGREES, Plot, heat, limit_of, ticks, turn_map
 from tirelib.report.page import unit_name
 
+DIGITS = {"load": ",.0f", "pressure": ".2f", "camber": ".1f", "speed": ".0f"}
+"""How the set point of a condition is said."""
+_BINS = 24
+
 
 def strain_maps(found: Assessment) -> list[Plot]:
     """Return the map without the named effects and, where there are some, with them."""
@@ -41,11 +45,6 @@ def _turns(found: Assessment, left: Left, name: str, title: str) -> Plot:
         [("wheel angle [deg]", DEGREES), *columns],
         3,
     )
-
-
-DIGITS = {"load": ",.0f", "pressure": ".2f", "camber": ".1f", "speed": ".0f"}
-"""How the set point of a condition is said."""
-_BINS = 24
 
 
 def force_maps(found: ForceAssessment) -> list[Plot]:

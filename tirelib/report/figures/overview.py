@@ -48,6 +48,9 @@ from tirelib.report.style import (
     zero_line,
 )
 
+DISSERTATION = {"Fz": "Fig. 4-4", "alpha": "Fig. 4-7", "Fy": "Table 4-1"}
+"""The dissertation's regression of each quantity."""
+
 
 @styled
 def figure_accuracy(observations: Observations, estimates: Estimates) -> Figure:
@@ -132,10 +135,6 @@ def figure_4_8(observations: Observations, estimates: Estimates) -> Figure:
     lower.grid(visible=False, axis="x")
     legend_below(figure, [upper], columns=6)
     return figure
-
-
-DISSERTATION = {"Fz": "Fig. 4-4", "alpha": "Fig. 4-7", "Fy": "Table 4-1"}
-"""The dissertation's regression of each quantity."""
 
 
 @styled

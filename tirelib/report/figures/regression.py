@@ -25,6 +25,8 @@ from tirelib.report.style import (
 RESIDUAL = "measured \N{MINUS SIGN} estimated"
 ANGLE = label("slip angle", "deg", signed=True)
 _FIT = np.polynomial.polynomial
+_InUse = tuple[FloatArray, FloatArray] | None
+"""Measured and estimated values; None where the quantity is not calibrated or not shown."""
 
 
 def find_regression(trained: Trained, source: str) -> Regression | None:
@@ -162,10 +164,6 @@ def figure_4_7(trained: Trained) -> Figure:
     """
     regressor = label("slope of peak strain rates", "1/(rad m)", signed=True)
     return _of_angle(trained, "Fig. 4-7", regressor, in_use(trained, "alpha"))
-
-
-_InUse = tuple[FloatArray, FloatArray] | None
-"""Measured and estimated values; None where the quantity is not calibrated or not shown."""
 
 
 def _of_angle(trained: Trained, source: str, regressor: str, held: _InUse) -> Figure:
