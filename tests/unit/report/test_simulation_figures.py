@@ -170,7 +170,7 @@ def test_labels_say_what_differs() -> None:
 def test_figures_do_not_need_pyplot() -> None:
     code = (
         "import sys; from ring_figures import contact, lateral, loads, speed, static; "
-        "from tirelib.report.figures import ring_simulation; "
+        "from tirelib.report.figures import ring_panels; "
         "sys.exit('matplotlib.pyplot' in sys.modules)"
     )
     build = Path(__file__).parents[3] / "build"
