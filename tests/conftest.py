@@ -33,7 +33,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 def pytest_configure(config: pytest.Config) -> None:
     """Give the processes of a run a folder in common."""
-    once.share_a_folder(config)
+    once.share_a_folder(config.add_cleanup)
 
 
 @pytest.hookimpl(wrapper=True)

@@ -1,5 +1,6 @@
 """What takes long to make is made by one process of a test run, and read by all of them."""
 
+import atexit
 import fcntl
 import os
 import pickle
@@ -9,8 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-import pytest
-
 PLACE = "TIRELIB_TESTS_ONCE"
 """Environment variable with the folder that the processes of a run share."""
 MADE: list[Path] = []
@@ -18,15 +17,19 @@ MADE: list[Path] = []
 Value = TypeVar("Value")
 
 
-def share_a_folder(config: pytest.Config) -> None:
+def share_a_folder(at_the_end: Callable[[Callable[[], None]], object] = atexit.register) -> None:
     """Make the folder of a run; the processes that this one starts find it."""
     if PLACE not in os.environ:
         os.environ[PLACE] = tempfile.mkdtemp(prefix="tirelib_once_")
-        config.add_cleanup(lambda: shutil.rmtree(os.environ.pop(PLACE), ignore_errors=True))
+        at_the_end(lambda: shutil.rmtree(os.environ.pop(PLACE), ignore_errors=True))
 
 
 def once(name: str, fill: Callable[[Path], object]) -> Path:
-    """Return a folder that the first process to ask for it fills, while the others wait."""
+    """Return a folder that the first process to ask for it fills, while the others wait.
+
+    A program of ``build`` that asks without a test run has a folder until it ends.
+    """
+    share_a_folder()
     folder = Path(os.environ[PLACE]) / name
     filled = folder.with_name(f"{name}.filled")
     with folder.with_name(f"{name}.lock").open("w") as lock:

@@ -117,7 +117,7 @@ static int gap_in(const Cutter *c, int64_t first, int64_t stop) {
     return 0;
 }
 
-/* Reference: TurnCutter._damaged */
+/* Reference: LastSamples.inspected */
 static int damaged(const Cutter *c, const Contact *contact) {
     int64_t rise = (int64_t)contact->rise, fall = (int64_t)contact->fall;
     return gap_in(c, rise - NEAR_EDGE, rise + 2) || gap_in(c, fall - NEAR_EDGE, fall + 2);
@@ -142,7 +142,7 @@ static double sum_of(const double *x, size_t n) {
 }
 
 /* Mean or median of a column between two sample numbers; `gap` where too much is missing.
- * Reference: TurnCutter._mean */
+ * Reference: LastSamples._mean */
 static double mean_of(const Cutter *c, int column, double start, double stop, int robust,
                       int *gap) {
     int64_t a = kept_from(c, whole(rint(start))), b = whole(rint(stop));
@@ -193,7 +193,7 @@ static double or_zero(double x) {
 }
 
 /* Offset at the contact, its std, and how it moved since it was last read; keeps what was read.
- * Reference: TurnCutter._offset */
+ * Reference: offset_at */
 static void follow_offset(Cutter *c, const double *opposite, Turn *turn, double *moved) {
     double time = law_sample(&c->law, -PI);
     for (int g = 0; g < c->gages; g++) {
@@ -242,7 +242,7 @@ static void nothing_known(Turn *turn, int gages) {
     turn->flags = 0;
 }
 
-/* Reference: TurnCutter._first_turn */
+/* Reference: unknown_turn */
 static void first_turn(const Cutter *c, const Contact *contact, Turn *turn) {
     nothing_known(turn, c->gages);
     turn->time = contact_middle(contact) / c->rate;
