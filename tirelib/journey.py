@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from tirelib.core.parameters import TireFile
     from tirelib.effects import Effect
     from tirelib.inference.compare import Comparison, ForceComparison
-    from tirelib.inference.diagnose.document import Assessment
-    from tirelib.inference.diagnose.forces.assess import ForceAssessment
+    from tirelib.inference.diagnose.assess import Assessment, ForceAssessment
     from tirelib.inference.identify.whole import Whole
     from tirelib.report.simulation import Simulation
 
@@ -123,13 +122,14 @@ def diagnose(
     catalogue = _catalogue(effects)
     effects_of = list(catalogue.values())
     if explains_forces(quantity, campaign, model):
-        from tirelib.inference.diagnose.forces.assess import assess_forces, force_case
+        from tirelib.inference.diagnose.assess import assess_forces
+        from tirelib.inference.diagnose.forces.case import force_case
 
         case = force_case(campaign, model, catalogue, quantity)
         return assess_forces(case, effects_of, false_alarm=false_alarm, progress=progress)
     from tirelib.inference.compare.model import model_of
+    from tirelib.inference.diagnose.assess import assess
     from tirelib.inference.diagnose.diagnose import diagnose as diagnose_strain
-    from tirelib.inference.diagnose.document import assess
     from tirelib.inference.identify.campaign_data import straight_runs
     from tirelib.measured.waveforms import measure_waveforms
 

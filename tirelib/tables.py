@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
     from tirelib.core.parameters import TireFile
     from tirelib.estimators.estimate import Estimates
-    from tirelib.inference.diagnose.document import Assessment
-    from tirelib.inference.diagnose.forces.assess import ForceAssessment
+    from tirelib.inference.diagnose.assess import Assessment, ForceAssessment
     from tirelib.measured.observations import Observations
 
 UNITS = {"time": "s", "Fz": "N", "alpha": "rad", "kappa": "1", "Fy": "N"}
@@ -126,7 +125,7 @@ def parameter_table(model: "TireFile") -> "pd.DataFrame":
     nothing = [np.nan, np.nan]
     rows = {}
     for name, number in model.numbers.items():
-        low, high = number.notes.get("intervalSI_UNITS", nothing)
+        low, high = number.notes.get("interval_SI", nothing)
         rows[name] = {
             "value": number.value,
             "std": number.std,
@@ -156,11 +155,6 @@ def candidate_table(found: "Assessment | ForceAssessment") -> "pd.DataFrame":
     """
     import pandas as pd  # slow to import
 
-    from tirelib.inference.diagnose.document import Assessment, diagnosis_document
-    from tirelib.inference.diagnose.forces.document import force_diagnosis_document
+    from tirelib.inference.diagnose.document import diagnosis_document
 
-    if isinstance(found, Assessment):
-        document = diagnosis_document(found)
-    else:
-        document = force_diagnosis_document(found)
-    return pd.DataFrame(document["candidates"]).set_index("effect")
+    return pd.DataFrame(diagnosis_document(found)["candidates"]).set_index("effect")

@@ -20,7 +20,7 @@ from tests.magic_sweep import _force
 from tirelib.core.arrays import FloatArray
 from tirelib.effects import CATALOGUE
 from tirelib.inference.compare.force_model import ForceModel
-from tirelib.inference.diagnose.forces.assess import ForceCase
+from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.diagnose.forces.fit import MeasuredForce
 from tirelib.inference.diagnose.forces.models import plain_tires
 from tirelib.inference.identify.brush_fit import fit_brush

@@ -30,8 +30,7 @@ from tirelib.core.errors import TirelibError
 if TYPE_CHECKING:
     from tirelib.core.parameters import TireFile
     from tirelib.effects import Effect
-    from tirelib.inference.diagnose.document import Assessment
-    from tirelib.inference.diagnose.forces.assess import ForceAssessment
+    from tirelib.inference.diagnose.assess import Assessment, ForceAssessment
 
 _EXAMPLE = """\b
 Examples:
@@ -119,18 +118,16 @@ def diagnosed(
     progress: Callable[[str], None],
 ) -> tuple["Assessment | ForceAssessment", dict[str, Any]]:
     """Return a diagnosis, and its document with the run that distinguishes what it cannot."""
-    from tirelib.inference.diagnose.document import Assessment, diagnosis_document
-    from tirelib.inference.diagnose.forces.document import force_diagnosis_document
+    from tirelib.inference.diagnose.assess import Assessment
+    from tirelib.inference.diagnose.document import diagnosis_document
     from tirelib.inference.planning.document import next_test_document
     from tirelib.journey import diagnose as diagnose_model
 
     told = diagnose_model(
         campaign, file, quantity, effects=catalogue, false_alarm=false_alarm, progress=progress
     )
-    if not isinstance(told, Assessment):
-        return told, force_diagnosis_document(told)
     document = diagnosis_document(told)
-    if document["verdict"] == "indistinguishable":
+    if isinstance(told, Assessment) and document["verdict"] == "indistinguishable":
         hypotheses = told.diagnosis.verdict.hypotheses
         try:
             document["next_test"] |= next_test_document(

@@ -28,8 +28,7 @@ from tirelib.journey import QUANTITIES, explains_forces
 if TYPE_CHECKING:
     from tirelib.core.parameters import TireFile
     from tirelib.effects import Effect
-    from tirelib.inference.diagnose.document import Assessment
-    from tirelib.inference.diagnose.forces.assess import ForceAssessment
+    from tirelib.inference.diagnose.assess import Assessment, ForceAssessment
     from tirelib.report.journey import Journey
 
 FORMAT = "tirelib-explanation/1"
@@ -221,7 +220,7 @@ class Steps:
 
     def _settled(self, file: "TireFile", quantity: str | None) -> str | None:
         """Return the quantity; of forces it is settled once for all steps."""
-        from tirelib.inference.diagnose.forces.assess import force_case
+        from tirelib.inference.diagnose.forces.case import force_case
 
         if not explains_forces(quantity, self.campaign, file):
             return quantity

@@ -127,8 +127,9 @@ def next_test(
     from tirelib.core.parameters import read_tire
     from tirelib.inference.compare.error import error_of
     from tirelib.inference.compare.model import model_of
+    from tirelib.inference.diagnose.assess import assess
     from tirelib.inference.diagnose.diagnose import diagnose, plain_tires
-    from tirelib.inference.diagnose.document import assess, diagnosis_document
+    from tirelib.inference.diagnose.document import diagnosis_document
     from tirelib.inference.identify.campaign_data import straight_runs
     from tirelib.inference.planning.document import plan_document, plan_test
     from tirelib.inference.planning.envelope import Envelope
@@ -228,7 +229,7 @@ def _for_force(
     sweep: bool | None,
 ) -> tuple[dict[str, Any], "Plan"]:
     """Return the next test of a force, as a document and as a plan."""
-    from tirelib.inference.diagnose.forces.assess import force_case
+    from tirelib.inference.diagnose.forces.case import force_case
     from tirelib.inference.planning.document import plan_document, plan_force_test
     from tirelib.inference.planning.force_runs import force_envelope
     from tirelib.inference.planning.suspects import given_suspects, suspects_of

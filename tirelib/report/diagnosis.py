@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from tirelib.inference.diagnose.document import Assessment
-from tirelib.inference.diagnose.forces.assess import ForceAssessment
+from tirelib.inference.diagnose.assess import Assessment, ForceAssessment
 from tirelib.report.comparison import BRUSH, METHOD, RING
 from tirelib.report.error_sentences import fold_name
 from tirelib.report.explanation import STANDS_OUT, mark_of, stands, titled

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.inference.diagnose.told import listed
+from tirelib.inference.diagnose.document import listed
 from tirelib.inference.statistics.plain import ROUGHLY
 from tirelib.report.error_sentences import error_line, is_known, said_error
 from tirelib.report.page import number

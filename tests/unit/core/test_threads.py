@@ -20,8 +20,7 @@ from tirelib.estimators.train import train
 from tirelib.inference.compare.compare import compare
 from tirelib.inference.diagnose.diagnose import diagnose
 from tirelib.inference.diagnose.forces.diagnose import diagnose_force
-from tirelib.inference.extend.extension import extended
-from tirelib.inference.extend.force_extension import extended_brush
+from tirelib.inference.extend.extension import extended, extended_brush
 from tirelib.inference.identify.forces import identify_forces
 from tirelib.inference.identify.identify import identify
 from tirelib.inference.identify.whole import identify_whole
@@ -90,7 +89,7 @@ class Asked:
         (identify_forces, 1, ()),
         (compare, 2, ()),
         (diagnose, 3, ()),
-        (diagnose_force, 3, ("noise",)),
+        (diagnose_force, 2, ()),
         (extended, 3, ()),
         (extended_brush, 3, ()),
         (next_test, 3, ()),

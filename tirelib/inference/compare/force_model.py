@@ -1,16 +1,17 @@
 """A model file as something that predicts forces: its brush, with the effects that it has."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from tirelib.campaign import Campaign
+from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError, FormatError, ParameterError
 from tirelib.core.parameters import TireFile
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.inference.compare.model import UsedEffect, effects_of
+from tirelib.inference.compare.model import TireModel, UsedEffect, effects_of
 from tirelib.inference.identify.brush_model import BrushModel, brush_of
 from tirelib.inference.identify.force_bench import Changes, ForceBench
 from tirelib.inference.identify.force_checks import ANGLE_SPAN, RATIO_SPAN
@@ -51,6 +52,16 @@ class ForceModel:
     def changes(self) -> Changes:
         """What the effects change."""
         return [used.effect.at(used.strength) for used in self.used]
+
+    def fitted(
+        self,
+        values: Mapping[str, float],
+        effects: Sequence[Effect],
+        strengths: Sequence[FloatArray],
+    ) -> "ForceModel":
+        """Return the model with the parameters and effects of a fit."""
+        used = TireModel.fitted({}, effects, strengths).used
+        return replace(self, brush=replace(self.brush, values=values), used=used)
 
     def predict(self, points: ForcePoints) -> PointForces:
         """Return the forces at points.

@@ -1,18 +1,18 @@
 """Which effects a model of strain lacks, by `tirelib.inference.statistics`."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.threads import one_thread
 from tirelib.effects import Effect
-from tirelib.inference.diagnose.fitted import Fitted
 from tirelib.inference.diagnose.guess import Guess, guess_law
-from tirelib.inference.diagnose.strain_models import StrainModels
+from tirelib.inference.diagnose.strain_models import Fitted, StrainModels
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.identify.span import span
 from tirelib.inference.problems.strain import StrainProblem
@@ -63,6 +63,38 @@ class Finding:
     share: float
     twins: tuple[tuple[str, float], ...]
     power: float
+
+    @property
+    def at_most_hint(self) -> "Finding":
+        """The finding where nothing may be an alarm."""
+        return replace(self, level="hint") if self.level == "alarm" else self
+
+    def entry(self, rank: int, error_after: float, held_out: float) -> dict[str, Any]:
+        """Return the candidate of a document, with its rank from one.
+
+        The errors are those with it alone, the second on held-out data; NaN if unknown.
+        """
+        effect = self.effect
+        return {
+            "effect": effect.name,
+            "title": effect.title,
+            "rank": rank,
+            "score": self.score,
+            "threshold": self.threshold,
+            "level": self.level,
+            "p": self.p,
+            "p_std": self.p_std,
+            "strength": strength_told(self.strength),
+            "std": strength_told(self.std),
+            "unit": effect.unit,
+            "range": [effect.low, effect.high],
+            "in_range": self.in_range,
+            "error_after": error_after,
+            "heldout_error_after": held_out,
+            "share": self.share,
+            "twins": twins_told(self.twins),
+            "power": self.power,
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,17 +168,8 @@ def diagnose(
 ) -> Diagnosis:
     """Find which effects of a catalogue a model lacks.
 
-    Parameters
-    ----------
-    runs : StraightRuns
-    values : mapping
-        Numbers of the model's tire.
-    catalogue : sequence of Effect
-    effects, strengths
-        That the model has already.
-    false_alarm : float
-        Probability with which a plain tire is said to lack something.
-    progress : callable, optional
+    The model is the tire with these values and with the effects that it has already, at these
+    strengths; `false_alarm` is the probability with which a plain tire is said to lack something.
 
     Raises
     ------
@@ -195,15 +218,8 @@ def findings_of(
 ) -> tuple[Finding, ...]:
     """Return every effect that the plan may show, by rank.
 
-    Parameters
-    ----------
-    verdict : Verdict
-    problem : Problem
-        The problem that the verdict's hypotheses are about.
-    rest : shape (...)
-        What the model without further effects leaves, measured less model.
-    white_of : callable
-        Brings rows (k, ...) to the unit of errors.
+    `rest` (...) is what the model without further effects leaves, measured less model, and
+    `white_of` brings rows (k, ...) to the unit of errors.
     """
     first, null = verdict.base, verdict.base.null
     limit = first.limit(verdict.alpha)
@@ -212,11 +228,7 @@ def findings_of(
     tried = {h.names[-1]: h for h in verdict.tried if len(h.names) == len(first.names) + 1}
     named = verdict.sets[0] if verdict.kind in ("named", "form_inadequate") else ()
     members = {name for names in verdict.sets for name in names}
-    best = (
-        {}
-        if not verdict.sets
-        else dict(zip(verdict.best.names, range(len(verdict.best.names)), strict=True))
-    )
+    best = verdict.best.names if verdict.sets else ()
     own = span(white_of(first.fit.rows[BASE]).reshape(len(first.fit.rows[BASE]), -1).T)
     left_over = white_of(rest).ravel()
     left_over = left_over - own @ (own.T @ left_over)
@@ -243,21 +255,21 @@ def findings_of(
                 p_std,
                 strength,
                 std,
-                bool(
-                    (
-                        (strength >= effect.low - 2.0 * std) & (strength <= effect.high + 2.0 * std)
-                    ).all()
-                ),
+                _plausible(effect, strength, 2.0 * std),
                 _share(white_of(first.fit.rows[name]), own, left_over),
                 twins_of(name, first),
                 null.power(name, 1.0 / 3.0, limit),
             )
         )
-    order = {
-        name: k for k, name in enumerate(dict.fromkeys(n for names in verdict.sets for n in names))
-    }
+    every = dict.fromkeys(name for names in verdict.sets for name in names)
+    order = {name: k for k, name in enumerate(every)}
     rows.sort(key=lambda f: (order.get(f.effect.name, len(order)), -f.score))
     return tuple(rows)
+
+
+def _plausible(effect: Effect, strength: FloatArray, slack: FloatArray) -> bool:
+    inside = (strength >= effect.low - slack) & (strength <= effect.high + slack)
+    return bool(inside.all())
 
 
 def _share(white: FloatArray, own: FloatArray, rest: FloatArray) -> float:
@@ -277,3 +289,14 @@ def twins_of(name: str, first: Hypothesis) -> tuple[tuple[str, float], ...]:
         if other != name and not other.startswith(BASE) and not other.startswith(ROUGHLY)
     ]
     return tuple(sorted((pair for pair in near if pair[1] < TWIN_ANGLE), key=lambda pair: pair[1]))
+
+
+def twins_told(twins: Sequence[tuple[str, float]]) -> list[dict[str, Any]]:
+    """Return twins as documents tell them, angles in deg."""
+    return [{"effect": name, "angle_deg": float(np.rad2deg(angle))} for name, angle in twins]
+
+
+def strength_told(strength: FloatArray) -> float | list[float]:
+    """Return a strength as a number, or as a list if it has several components."""
+    numbers = [float(x) for x in strength]
+    return numbers[0] if len(numbers) == 1 else numbers

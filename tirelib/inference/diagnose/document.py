@@ -1,130 +1,68 @@
-"""A diagnosis with what its reader needs: floor, held-out errors, what is left; as JSON."""
+"""A diagnosis of strain or of a force as JSON (``tirelib-diagnosis/1``)."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from tirelib.core.errors import TirelibError
-from tirelib.inference.compare.error import NOISE, ModelError, named_errors
-from tirelib.inference.compare.model import TireModel
-from tirelib.inference.diagnose.diagnose import Diagnosis, Finding
-from tirelib.inference.diagnose.fitted import Fitted
-from tirelib.inference.diagnose.floor import floor_of
+from tirelib.inference.compare.error import named_errors
+from tirelib.inference.compare.forces import UNITS
+from tirelib.inference.diagnose.assess import Assessed, Assessment, ForceAssessment
 from tirelib.inference.diagnose.guess import Guess
-from tirelib.inference.diagnose.left import Left, left_of, told_powers
-from tirelib.inference.diagnose.told import Assessed, listed, next_step
+from tirelib.inference.diagnose.held_out import pooled
 
-NO_REPEATS = (
-    "no runs were repeated at equal set points, so the noise is unknown: errors are in "
-    "microstrain, no effect is named and none is more than a hint; repeat some runs"
-)
+FORMAT = "tirelib-diagnosis/1"
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Assessment(Assessed):
-    """What the document of a strain diagnosis holds; it has no folds if nothing is named.
+def diagnosis_document(told: Assessment | ForceAssessment) -> dict[str, Any]:
+    """Return the numbers of a diagnosis.
 
-    Attributes
-    ----------
-    given : TireModel
-        The model that was diagnosed, as its file has it.
-    before, refitted, after : ModelError
-        Errors of the model as it is given, with the numbers of the least error, and with the named
-        effects.
-    left : Left
-        What no effect explains.
+    Strains are in microstrain, angles in deg; errors in the noise of a run or of a point, without
+    repeats in microstrain, N or Nm.
     """
-
-    diagnosis: Diagnosis
-    given: TireModel
-    before: ModelError
-    refitted: ModelError
-    after: ModelError
-    left: Left
-
-    def error_with(self, finding: Finding) -> float:
-        """Return the error with one effect alone, to first order unless it is the one named."""
-        if self.named == (finding.effect.name,):
-            return self.after.value
-        return self.refitted.value * float(np.sqrt(max(1.0 - finding.share, 0.0)))
+    return _shared(told) | (_strain(told) if isinstance(told, Assessment) else _force(told))
 
 
-def assess(found: Diagnosis, given: TireModel) -> Assessment:
-    """Return a diagnosis with floor, held-out errors and what is left.
-
-    Parameters
-    ----------
-    found : Diagnosis
-    given : TireModel
-        The model that was diagnosed, as its file has it.
-    """
-    models = found.models
-    verdict, named, findings, messages = found.verdict.kind, found.named, found.findings, []
-    if models.yardstick.unit != NOISE:
-        verdict, named = "none", ()
-        findings = tuple(_hint(finding) for finding in findings)
-        messages.append(NO_REPEATS)
-    final = found.final if named else found.base
-    chosen = models.folds if named else ()
-    singles = {name: one for name in named if (one := _with_one(found, name)) is not None}
-    models.find(found.base, given, held=(found.base, *singles.values(), final) if chosen else ())
-    before, refitted = models.least_error(found.base, given)
-    after = final.reached if named else refitted
-    floor = floor_of(after, found.verdict.best, found.verdict.alpha)
-    if named and not chosen:
-        messages.append(
-            "nothing can be held out: three loads or two pressures, and four other runs, are needed"
-        )
-    messages += [
-        _too_large(finding)
-        for finding in findings
-        if finding.effect.name in named and not finding.in_range
-    ]
-    return Assessment(
-        diagnosis=found,
-        verdict=verdict,
-        named=named,
-        findings=findings,
-        floor=floor,
-        folds=chosen,
-        singles=singles,
-        messages=tuple(messages),
-        given=given,
-        before=before,
-        refitted=refitted,
-        after=after,
-        left=_left(found, final),
-    )
-
-
-def _too_large(finding: Finding) -> str:
-    effect = finding.effect
-    size = ", ".join(f"{x:.3g}" for x in finding.strength)
-    return (
-        f"{effect.name} explains it, but only at {size} {effect.unit}, and {effect.low:g} to "
-        f"{effect.high:g} is plausible: it is larger than thought, or something of the same kind; "
-        "measure it in another way before it is believed"
-    )
-
-
-def _hint(finding: Finding) -> Finding:
-    return replace(finding, level="hint") if finding.level == "alarm" else finding
-
-
-def _with_one(found: Diagnosis, name: str) -> Fitted | None:
-    """Return the base model with one effect fitted, or None if that fails."""
-    try:
-        return found.models.at((name,))
-    except TirelibError:
-        return None
-
-
-def diagnosis_document(told: Assessment) -> dict[str, Any]:
-    """Return the numbers as ``tirelib-diagnosis/1``; strains in microstrain, angles in deg."""
+def _shared(told: Assessed) -> dict[str, Any]:
+    """Return the keys that documents of strain and of forces share."""
+    found, verdict = told.diagnosis, told.diagnosis.verdict
+    before, after = told.held_out(found.base), told.held_out(told.final)
+    folds = told.folds
     return {
-        **told.shared,
+        "format": FORMAT,
+        "axes": "iso",
+        "floor": told.floor,
+        "heldout_error_before": pooled(before, folds),
+        "heldout_error_after": pooled(after, folds),
+        "held_out": [f.entry(old, new) for f, old, new in zip(folds, before, after, strict=True)],
+        "verdict": told.verdict,
+        "named": list(told.named),
+        "sets": [list(names) for names in verdict.sets] if told.named else [],
+        "false_alarm": verdict.alpha,
+        "misfit": verdict.best.statistic,
+        "misfit_floor": verdict.best.limit(verdict.alpha),
+        "misfit_of": verdict.best.against,
+        "p": verdict.best.p,
+        "p_std": verdict.best.p_std,
+        "p_without": verdict.base.p,
+        "p_least": verdict.base.p_of(np.inf)[0],
+        "has": [effect.name for effect in found.base.effects],
+        "candidates": [
+            finding.entry(
+                rank,
+                told.error_with(finding),
+                pooled(told.held_out(told.singles.get(finding.effect.name)), folds),
+            )
+            for rank, finding in enumerate(told.findings, start=1)
+        ],
+        "dead": list(found.dead),
+        "dead_reasons": dict(found.dead),
+        "messages": list(told.messages),
+    }
+
+
+def _strain(told: Assessment) -> dict[str, Any]:
+    return {
         "campaign": told.diagnosis.runs.waves.header.name,
         "quantity": "strain",
         "unit": "ustrain",
@@ -132,24 +70,54 @@ def diagnosis_document(told: Assessment) -> dict[str, Any]:
         "error_refitted": told.refitted.value,
         "repeats": told.diagnosis.runs.noise.repeats,
         "delay_us": 1e6 * told.after.delay,
-        "unexplained": _unexplained(told),
+        "unexplained": _strain_left(told),
         "next_test": next_test(told),
     }
 
 
-def _left(found: Diagnosis, final: Fitted) -> Left:
-    """Return what is left; how it grows by the guessed law, where there is one."""
-    points = found.problem.data.points
-    if found.beyond is None:
-        return left_of(final.reached, points)
-    left = left_of(final.reached, points, found.beyond)
-    if found.guess is None:
-        return left
-    powers = {**left.powers, **found.guess.powers}
-    return replace(left, powers=powers, scaling=told_powers(powers))
+def _force(told: ForceAssessment) -> dict[str, Any]:
+    found, case = told.diagnosis, told.case
+    return {
+        "campaign": case.name,
+        "quantity": case.quantity,
+        "unit": UNITS[case.quantity],
+        "noise": case.noise,
+        "repeats": case.repeats,
+        "points": len(case.problem),
+        "error_unit": case.unit,
+        "error_before": told.before,
+        "error_refitted": case.error(found.base),
+        "error_after": told.after,
+        "residual_rms_before": told.before / case.factor,
+        "residual_rms_after": told.after / case.factor,
+        "residual_rms_unit": UNITS[case.quantity],
+        "steps": [
+            {
+                "effect": name,
+                "error": case.factor * fit.error,
+                "heldout_error": pooled(told.held_out(fit), told.folds),
+            }
+            for name, fit in (found.steps if told.named else ())
+        ],
+        "unexplained": _force_left(told),
+        "next_test": force_next_test(told),
+    }
 
 
-def _unexplained(told: Assessment) -> dict[str, Any]:
+def _force_left(told: ForceAssessment) -> dict[str, Any]:
+    left, beyond = told.left, told.verdict in ("unknown", "form_inadequate")
+    return {
+        "where": left.where if beyond else None,
+        "scaling": left.scaling if beyond else None,
+        "guess": left.guess if beyond else None,
+        "bands": dict(left.bands),
+        "powers": {
+            name: {"power": p.value, "half_width": p.half} for name, p in left.powers.items()
+        },
+    }
+
+
+def _strain_left(told: Assessment) -> dict[str, Any]:
     left, guess = told.left, told.diagnosis.guess
     if not told.diagnosis.exceeds:
         return {"where": None, "scaling": None, "guess": None}
@@ -177,18 +145,14 @@ def _unexplained(told: Assessment) -> dict[str, Any]:
 
 def _gages(told: Assessment) -> list[dict[str, float]]:
     """Return the rms residual of each gage in use, in microstrain."""
-    found = told.diagnosis
-    waves = found.runs.waves
-    out = []
-    for gage in found.runs.gages:
-        rest = told.after.prediction.strain - waves.strain[:, gage]
-        out.append(
-            {
-                "lateral_mm": 1e3 * waves.header.gage_lateral[gage],
-                "rms_ustrain": 1e6 * float(np.sqrt(np.mean(rest**2))),
-            }
-        )
-    return out
+    runs, model = told.diagnosis.runs, told.after.prediction.strain
+    return [
+        {
+            "lateral_mm": 1e3 * runs.waves.header.gage_lateral[gage],
+            "rms_ustrain": 1e6 * float(np.sqrt(np.mean((model - runs.waves.strain[:, gage]) ** 2))),
+        }
+        for gage in runs.gages
+    ]
 
 
 def _guess(guess: Guess) -> dict[str, Any]:
@@ -210,29 +174,63 @@ def _guess(guess: Guess) -> dict[str, Any]:
     }
 
 
-def _and(names: Sequence[str]) -> str:
-    return listed(names, "load, pressure and speed")
+def listed(names: Sequence[str], none: str = "") -> str:
+    """Return names as words of a sentence."""
+    words = list(names) or [none]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _next_step(
+    told: Any, words: Mapping[str, Callable[[], str]], revived_by: Sequence[str]
+) -> dict[str, Any]:
+    """Return what to do or to measure next, and why.
+
+    `words` say it after the verdicts that strain and forces answer in their own words; reasons of
+    dead effects with one of the last words are such that other runs would show them.
+    """
+    said = {
+        "none": lambda: "none is needed for the effects that this plan can show",
+        "named": lambda: f"add {_add(told)} and diagnose again",
+        **words,
+    }
+    dead = told.diagnosis.dead.items()
+    return {
+        "what": said[told.verdict](),
+        "between": list(told.named) if told.verdict == "indistinguishable" else [],
+        "would_revive": {name: why for name, why in dead if any(w in why for w in revived_by)},
+    }
+
+
+def _add(told: Any) -> str:
+    return f"{listed(told.named, 'nothing')} (`tirelib add {' '.join(told.named)}`)"
+
+
+def _varied(told: Any) -> list[set[str]]:
+    """Return with which conditions each named effect varies."""
+    by_name = {finding.effect.name: finding.effect for finding in told.findings}
+    return [set(by_name[name].varies_with) for name in told.named]
 
 
 def next_test(told: Assessment) -> dict[str, Any]:
-    """Return what to do or to measure next, and why."""
-    by_name = {finding.effect.name: finding.effect for finding in told.findings}
-    varies = [set(by_name[name].varies_with) for name in told.named]
+    """Return what to do or to measure next on strain, and why."""
+    varies, named = _varied(told), told.named
     every = {name for names in varies for name in names}
     common = {name for name in every if all(name in names for names in varies)}
-    named = told.named
+
+    def conditions(names: Sequence[str]) -> str:
+        return listed(names, "load, pressure and speed")
 
     def parting() -> str:
         differ = sorted(every - common) or sorted(every)
-        return f"more levels of {_and(differ)}, to the ends that the rig allows: there " + (
-            f"{_and(named)} part" if len(named) > 1 else "it shows"
+        return f"more levels of {conditions(differ)}, to the ends that the rig allows: there " + (
+            f"{conditions(named)} part" if len(named) > 1 else "it shows"
         )
 
     words = {
         "indistinguishable": parting,
         "form_inadequate": lambda: (
-            f"{_and(named)} is needed but its law does not fit: more levels of "
-            f"{_and(sorted(every))} would show the right law"
+            f"{conditions(named)} is needed but its law does not fit: more levels of "
+            f"{conditions(sorted(every))} would show the right law"
         ),
         "unknown": lambda: (
             f"the misfit stands {told.left.where}; it {told.left.scaling}: more levels there, or "
@@ -243,6 +241,41 @@ def next_test(told: Assessment) -> dict[str, Any]:
         words["none"] = lambda: (
             "repeat some runs at equal set points, best at the ends of load, pressure and speed"
         )
-    dead = told.diagnosis.dead.items()
-    lacking = {name: reason for name, reason in dead if reason.startswith("no run has")}
-    return next_step(told, words, lacking)
+    return _next_step(told, words, ["no run has"])
+
+
+def force_next_test(told: ForceAssessment) -> dict[str, Any]:
+    """Return what to do or to measure next on a force, and why."""
+    varied = {name for names in _varied(told) for name in names}
+
+    def conditions(names: set[str]) -> str:
+        words = [name.replace("_", " ") for name in sorted(names)]
+        return listed(words, "load, pressure and slip")
+
+    def parting() -> str:
+        apart = varied - {"order"}
+        if apart == varied:
+            return f"more levels of {conditions(apart)}, to the ends that the rig allows"
+        # every run has its slips again
+        apart = {name for name in apart if not name.startswith("slip")}
+        return (
+            f"repeat the first {conditions(apart)} at the end, at the highest load and slip: a "
+            "drift has gone on, an effect of the condition is back where it was"
+        )
+
+    words = {
+        "indistinguishable": parting,
+        "form_inadequate": lambda: (
+            f"add {_add(told)}; more is left than plain tires leave: more levels of "
+            f"{conditions(varied)} would show the right law"
+        ),
+        "unknown": lambda: (
+            f"the misfit stands {told.left.where} and {told.left.scaling}: more levels there, or "
+            "an effect of your own (--effects)"
+        ),
+    }
+    if told.case.unit != "noise":
+        words["none"] = lambda: (
+            "repeat some conditions, best at the ends of load, pressure and slip"
+        )
+    return _next_step(told, words, ["no run varies", "not measured", "one way"])

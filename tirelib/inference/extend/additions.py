@@ -6,7 +6,7 @@ way to it. Where a diagnosis of the same campaign and model is at hand, its fits
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -16,33 +16,28 @@ from tirelib.core.parameters import TireFile
 from tirelib.effects import Effect
 from tirelib.inference.compare.force_model import ForceModel, force_model_of
 from tirelib.inference.compare.model import TireModel, model_of
-from tirelib.inference.diagnose.document import Assessment
-from tirelib.inference.diagnose.forces.assess import ForceAssessment, force_cases
+from tirelib.inference.diagnose.assess import Assessment, ForceAssessment
+from tirelib.inference.diagnose.forces.case import force_cases
 from tirelib.inference.extend.document import extension_document
 from tirelib.inference.extend.extension import (
     Extension,
+    ForceExtension,
+    case_for,
     extended,
+    extended_brush,
+    force_models,
     refuse,
+    refuse_brush,
+    remove_brush_effect,
     remove_effect,
     strain_models,
 )
-from tirelib.inference.extend.force_document import force_extended_file, force_extension_document
-from tirelib.inference.extend.force_extension import (
-    ForceExtension,
-    case_for,
-    extended_brush,
-    force_models,
-    refuse_brush,
-    remove_brush_effect,
-)
 from tirelib.inference.extend.model_file import extended_file
-from tirelib.inference.extend.step import Step
 from tirelib.inference.identify.campaign_data import straight_runs
 from tirelib.inference.identify.force_data import FORCES
 from tirelib.measured.waveforms import measure_waveforms
 
 Progress = Callable[[str], None]
-S = TypeVar("S", bound=Step[Any])
 Known = TireModel | ForceModel
 Extended = tuple[TireFile, dict[str, Any]]
 """A model after a step, and ``tirelib-extension/1`` of it."""
@@ -59,14 +54,12 @@ def additions(
     failed: Callable[[Effect, TirelibError], None] | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Extended]:
-    """Yield the model with one effect more after the other.
+    """Return the model with one effect more after the other, in turn.
 
     Parameters
     ----------
     effects : sequence of Effect
         All of strain, or all of the brush.
-    file : TireFile
-    campaign : Campaign
     quantity : str or None
         Measured quantity to fit; by default strain, for an effect of the brush the force that it
         helps most.
@@ -76,7 +69,6 @@ def additions(
         A diagnosis of this campaign and model: its fits are used.
     failed : callable, optional
         Called for an effect that cannot be added, which is then left out.
-    progress : callable, optional
 
     Raises
     ------
@@ -88,29 +80,28 @@ def additions(
     names = [effect.name for effect in effects]
     if len(set(names)) < len(names):
         raise ParameterError(f"effects {', '.join(names)}: one is named twice; leave it out")
-    written = _brush(campaign, catalogue)
+    step_of: Callable[[Effect, Any], Extension | ForceExtension]
     if isinstance(diagnosis, ForceAssessment):
-        _belongs(
-            diagnosis.case.name, diagnosis.case.model, campaign, force_model_of(file, catalogue)
-        )
         case, brush = diagnosis.case, diagnosis.diagnosis.models
-        return _chain(effects, file, partial(extended_brush, brush, case), written, failed)
-    if diagnosis is None and acts_on_forces(effects[0], quantity):
+        _belongs(case.name, case.model, campaign, force_model_of(file, catalogue))
+        step_of = partial(extended_brush, brush, case)
+    elif diagnosis is None and acts_on_forces(effects[0], quantity):
         case = case_for(force_cases(campaign, file, catalogue, quantity), effects[0])
         for effect in effects:
             refuse_brush(case, effect)
-        brush = force_models(case, effects, progress)
-        return _chain(effects, file, partial(extended_brush, brush, case), written, failed)
-    model = model_of(file, catalogue)
-    for effect in effects:
-        refuse(model, effect)
-    if diagnosis is None:
-        runs = straight_runs(measure_waveforms(campaign, progress=progress))
-        strain = strain_models(runs, model, effects, progress)
+        step_of = partial(extended_brush, force_models(case, effects, progress), case)
     else:
-        strain = diagnosis.diagnosis.models
-        _belongs(strain.runs.waves.header.name, diagnosis.given, campaign, model)
-    return _chain(effects, file, partial(extended, strain, model), _strain(campaign), failed)
+        model = model_of(file, catalogue)
+        for effect in effects:
+            refuse(model, effect)
+        if diagnosis is None:
+            runs = straight_runs(measure_waveforms(campaign, progress=progress))
+            strain = strain_models(runs, model, effects, progress)
+        else:
+            strain = diagnosis.diagnosis.models
+            _belongs(strain.runs.waves.header.name, diagnosis.given, campaign, model)
+        step_of = partial(extended, strain, model)
+    return _chain(effects, file, campaign, catalogue, step_of, failed)
 
 
 def removal(
@@ -131,11 +122,11 @@ def removal(
     """
     if acts_on_forces(effect, quantity):
         case = case_for(force_cases(campaign, file, catalogue, quantity), effect)
-        removed = remove_brush_effect(case, effect, progress=progress)
-        return _brush(campaign, catalogue)(file, removed)
+        brush = remove_brush_effect(case, effect, progress=progress)
+        return _written(file, brush, campaign, catalogue)
     runs = straight_runs(measure_waveforms(campaign, progress=progress))
     step = remove_effect(runs, model_of(file, catalogue), effect, progress=progress)
-    return _strain(campaign)(file, step)
+    return _written(file, step, campaign, catalogue)
 
 
 def acts_on_forces(effect: Effect, quantity: str | None) -> bool:
@@ -158,53 +149,45 @@ def _belongs(name: str, of: Known, campaign: Campaign, model: Known) -> None:
         )
 
 
-def _strain(campaign: Campaign) -> Callable[[TireFile, Extension], Extended]:
-    def written(file: TireFile, step: Extension) -> Extended:
-        new = extended_file(file, step, campaign.content_hash())
-        return new, extension_document(step, new)
+def _written(
+    file: TireFile,
+    step: Extension | ForceExtension,
+    campaign: Campaign,
+    catalogue: Mapping[str, Effect],
+) -> Extended:
+    """Return the model after a step and the step's document.
 
-    return written
-
-
-def _brush(
-    campaign: Campaign, catalogue: Mapping[str, Effect]
-) -> Callable[[TireFile, ForceExtension], Extended]:
-    def written(file: TireFile, step: ForceExtension) -> Extended:
-        new = force_extended_file(file, step, campaign.content_hash())
-        others = _others(campaign, (file, new), catalogue, step.case.quantity)
-        return new, force_extension_document(step, new) | {"others": others}
-
-    return written
-
-
-def _others(
-    campaign: Campaign, files: Sequence[TireFile], catalogue: Mapping[str, Effect], fitted: str
-) -> dict[str, dict[str, Any]]:
-    """Return the errors of the forces that were not fitted, before and after: one brush has all."""
-    told = {}
-    for name in FORCES:
-        if name == fitted:
-            continue
-        try:
-            (old,), (new,) = (force_cases(campaign, each, catalogue, name) for each in files)
-        except CalibrationError:
-            continue
-        told[name] = {"error_before": old.given, "error_after": new.given, "error_unit": new.unit}
-    return told
+    One brush has all forces: that of a force tells the errors of the others, before and after.
+    """
+    new = extended_file(file, step, campaign.content_hash())
+    document = extension_document(step, new)
+    if isinstance(step, ForceExtension):
+        document["others"] = others = {}
+        for name in (each for each in FORCES if each != step.case.quantity):
+            try:
+                (old,), (now,) = (
+                    force_cases(campaign, each, catalogue, name) for each in (file, new)
+                )
+            except CalibrationError:
+                continue
+            errors = {"error_before": old.given, "error_after": now.given, "error_unit": now.unit}
+            others[name] = errors
+    return new, document
 
 
 def _chain(
     effects: Sequence[Effect],
     file: TireFile,
-    step_of: Callable[[Effect, Any], S],
-    written: Callable[[TireFile, S], Extended],
+    campaign: Campaign,
+    catalogue: Mapping[str, Effect],
+    step_of: Callable[[Effect, Any], Extension | ForceExtension],
     failed: Callable[[Effect, TirelibError], None] | None,
 ) -> Iterator[Extended]:
     before = None
     for effect in effects:
         try:
             step = step_of(effect, before)
-            file, document = written(file, step)
+            file, document = _written(file, step, campaign, catalogue)
         except TirelibError as error:
             if failed is None:
                 raise

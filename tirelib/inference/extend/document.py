@@ -7,10 +7,9 @@ import numpy as np
 
 from tirelib.core.parameters import TireFile
 from tirelib.inference.compare.error import named_errors
-from tirelib.inference.diagnose.held_out import fold_entry, pooled
-from tirelib.inference.diagnose.told import strength_told
-from tirelib.inference.extend.extension import Extension
-from tirelib.inference.extend.step import Step
+from tirelib.inference.compare.forces import UNITS
+from tirelib.inference.diagnose.diagnose import strength_told
+from tirelib.inference.extend.extension import Extension, ForceExtension
 
 FORMAT = "tirelib-extension/1"
 NO_REPEATS = (
@@ -19,18 +18,39 @@ NO_REPEATS = (
 )
 
 
-def extension_document(done: Extension, file: TireFile) -> dict[str, Any]:
+def extension_document(done: Extension | ForceExtension, file: TireFile) -> dict[str, Any]:
     """Return the numbers of an extension and the history of the model that came out."""
-    messages = [] if done.given.known else [NO_REPEATS]
-    if not done.folds:
-        messages.append(
-            "nothing can be held out: three loads or two pressures, and four other runs, are needed"
-        )
-    held_out = [
-        fold_entry(fold, old, new)
-        for fold, old, new in zip(done.folds, done.held_before, done.held_after, strict=True)
-    ]
-    head = {
+    if isinstance(done, Extension):
+        head, messages, factor = _strain(done), _strain_messages(done), 1.0
+    else:
+        head, messages, factor = _force(done), _force_messages(done), done.case.factor
+    held_out = zip(done.folds, done.held_before, done.held_after, strict=True)
+    return {
+        "format": FORMAT,
+        "action": done.action,
+        "effect": done.effect.name,
+        "title": done.effect.title,
+        "strength": strength_told(done.strength),
+        "std": strength_told(done.std),
+        "unit": done.effect.unit,
+        "range": [done.effect.low, done.effect.high],
+        "in_range": "out_of_range" not in done.flags,
+        "flags": list(done.flags),
+        **head,
+        "waterfall": waterfall(file.extra["history"], str(head["quantity"])),
+        "held_out": [fold.entry(factor * old, factor * new) for fold, old, new in held_out],
+        "effects": list(file.extra["effects"]),
+        "history": [
+            {key: value for key, value in entry.items() if key != "before"}
+            for entry in file.extra["history"]
+        ],
+        "messages": messages,
+    }
+
+
+def _strain(done: Extension) -> dict[str, Any]:
+    errors = done.errors
+    return {
         "campaign": done.runs.waves.header.name,
         "quantity": "strain",
         **named_errors(done.given, done.reached),
@@ -38,10 +58,44 @@ def extension_document(done: Extension, file: TireFile) -> dict[str, Any]:
         "runs": run_errors(done),
         "floor": done.floor,
         "delay_us": 1e6 * done.reached.delay,
-        "heldout_error_before": pooled(done.held_before, done.folds),
-        "heldout_error_after": pooled(done.held_after, done.folds),
+        "heldout_error_before": errors["heldout_error_before"],
+        "heldout_error_after": errors["heldout_error_after"],
     }
-    return step_document(done, file, head, held_out, messages)
+
+
+def _force(done: ForceExtension) -> dict[str, Any]:
+    case, errors = done.case, done.errors
+    return {
+        "campaign": case.name,
+        "quantity": case.quantity,
+        "noise": case.noise,
+        "error_unit": case.unit,
+        **errors,
+        "residual_rms_before": errors["error_before"] / case.factor,
+        "residual_rms_after": errors["error_after"] / case.factor,
+        "residual_rms_unit": UNITS[case.quantity],
+    }
+
+
+def _strain_messages(done: Extension) -> list[str]:
+    messages = [] if done.given.known else [NO_REPEATS]
+    if not done.folds:
+        messages.append(
+            "nothing can be held out: three loads or two pressures, and four other runs, are needed"
+        )
+    return messages
+
+
+def _force_messages(done: ForceExtension) -> list[str]:
+    messages = list(done.case.messages)
+    if done.unit != "noise":
+        messages.append(
+            f"no condition was repeated, so the noise is unknown and errors are in {done.unit}; "
+            "repeat some runs"
+        )
+    if not any(fold.main for fold in done.folds):
+        messages.append("nothing can be held out: too few conditions vary")
+    return messages
 
 
 def run_errors(done: Extension) -> list[dict[str, Any]]:
@@ -93,34 +147,3 @@ def waterfall(history: Sequence[Mapping[str, Any]], quantity: str) -> list[dict[
 
     first = row("start", None, told[0], "before")
     return [first, *(row(e.get("action", "add"), e.get("effect", "?"), e, "after") for e in told)]
-
-
-def step_document(
-    done: Step[Any],
-    file: TireFile,
-    head: Mapping[str, Any],
-    held_out: Sequence[Mapping[str, Any]],
-    messages: Sequence[str],
-) -> dict[str, Any]:
-    """Return ``tirelib-extension/1``: what every step tells, beside its own numbers."""
-    return {
-        "format": FORMAT,
-        "action": done.action,
-        "effect": done.effect.name,
-        "title": done.effect.title,
-        "strength": strength_told(done.strength),
-        "std": strength_told(done.std),
-        "unit": done.effect.unit,
-        "range": [done.effect.low, done.effect.high],
-        "in_range": "out_of_range" not in done.flags,
-        "flags": list(done.flags),
-        **head,
-        "waterfall": waterfall(file.extra["history"], str(head["quantity"])),
-        "held_out": list(held_out),
-        "effects": list(file.extra["effects"]),
-        "history": [
-            {key: value for key, value in entry.items() if key != "before"}
-            for entry in file.extra["history"]
-        ],
-        "messages": list(messages),
-    }

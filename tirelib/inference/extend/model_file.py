@@ -10,104 +10,29 @@ from tirelib.core.errors import FormatError
 from tirelib.core.parameters import NUMBERS, Number, TireFile
 from tirelib.core.parameters.tire import range_fault
 from tirelib.core.version import __version__
-from tirelib.inference.diagnose.held_out import pooled
-from tirelib.inference.diagnose.told import strength_told
-from tirelib.inference.extend.extension import Extension
-from tirelib.inference.extend.step import Step
+from tirelib.inference.diagnose.diagnose import strength_told
+from tirelib.inference.extend.extension import Extension, ForceExtension
+from tirelib.inference.identify.brush_model import stored_number
 from tirelib.model.base import BARE, coordinates
 
 
-def extended_file(file: TireFile, done: Extension, data_hash: str) -> TireFile:
+def extended_file(file: TireFile, done: Extension | ForceExtension, data_hash: str) -> TireFile:
     """Return the model file of an extension: fitted numbers, effects and a history entry.
+
+    Effects of the file that the step did not fit stay as they are.
 
     Raises
     ------
     FormatError
         If a fitted number lies where no tire's can.
     """
-    name = done.runs.waves.header.name
-    fitted = {c.name: (float(done.after.values[c.name]), c) for c in coordinates(done.after.values)}
-    refuse_beyond({name: value for name, (value, _) in fitted.items()})
-    numbers = {}
-    for index, (value, coordinate) in enumerate(fitted.values()):
-        if np.isfinite(value):
-            numbers[coordinate.name] = _number(
-                file.numbers.get(coordinate.name),
-                value,
-                coordinate.spread(value, float(np.sqrt(done.after.covariance[index, index]))),
-                coordinate.unit == 0.0,
-                f"strain waveforms of {name}, {len(done.runs.waves)} straight runs",
-            )
-    errors = {
-        "error_before": done.given.value,
-        "error_after": done.reached.value,
-        "floor": done.floor,
-        "heldout_error_before": pooled(done.held_before, done.folds),
-        "heldout_error_after": pooled(done.held_after, done.folds),
-    }
-    unit = "noise" if done.given.known else "ustrain"
-    entry = history_entry(file, done, errors, unit, tuple(fitted))
-    return stepped(file, done, numbers, entry | {"campaign": name, "data_sha256": data_hash})
-
-
-def refuse_beyond(values: Mapping[str, float]) -> None:
-    """Refuse fitted values, by name in a file, that lie where no tire's can.
-
-    Raises
-    ------
-    FormatError
-        With all of them.
-    """
-    faults = [
-        f"{name} after the fit: {fault}; the effect is not added"
-        for name, value in values.items()
-        if (fault := range_fault(name, value)) is not None
-    ]
-    if faults:
-        raise FormatError(faults)
-
-
-def history_entry(
-    file: TireFile, done: Step[Any], errors: Mapping[str, float], unit: str, names: Sequence[str]
-) -> dict[str, Any]:
-    """Return what the history holds of a step, and of the file before it.
-
-    Parameters
-    ----------
-    file : TireFile
-        Before the step.
-    done : Step
-    errors : mapping
-        By name; one that is not known is left out.
-    unit : str
-        Unit of the errors: without noise they stand under names that end in it.
-    names : sequence of str
-        Numbers of the file that the step wrote.
-    """
-    suffix = "" if unit == "noise" else f"_{unit}"
-    return {
-        "action": done.action,
-        "effect": done.effect.name,
-        "strength": strength_told(done.strength),
-        "std": strength_told(done.std),
-        "unit": done.effect.unit,
-        **{f"{name}{suffix}": value for name, value in errors.items() if np.isfinite(value)},
-        "tirelib": __version__,
-        "before": {
-            "effects": list(file.extra.get("effects", [])),
-            "written": list(names),
-            "numbers": {n: written(file.numbers[n]) for n in names if n in file.numbers},
-        },
-    }
-
-
-def stepped(
-    file: TireFile, done: Step[Any], numbers: Mapping[str, Number], entry: Mapping[str, Any]
-) -> TireFile:
-    """Return a file with the numbers, the effects and the history entry of a step.
-
-    Effects of the file that the step did not fit stay as they are.
-    """
+    if isinstance(done, Extension):
+        names, numbers = _ring(file, done)
+        told = {"campaign": done.runs.waves.header.name}
+    else:
+        numbers = _brush(done)
+        names, told = tuple(numbers), {"quantity": done.case.quantity, "campaign": done.case.name}
+    entry = _history_entry(file, done, names) | told | {"data_sha256": data_hash}
     fitted = {effect.name for effect in (*done.before.effects, *done.after.effects)}
     kept = [each for each in file.extra.get("effects", []) if each.get("effect") not in fitted]
     effects = [
@@ -122,6 +47,74 @@ def stepped(
     history = [*file.extra.get("history", []), entry]
     extra = {**file.extra, "effects": [*kept, *effects], "history": history}
     return replace(file, numbers={**file.numbers, **numbers}, extra=extra)
+
+
+def _ring(file: TireFile, done: Extension) -> tuple[tuple[str, ...], dict[str, Number]]:
+    """Return the names of what was fitted to strain, and the numbers that are finite."""
+    runs = done.runs.waves
+    source = f"strain waveforms of {runs.header.name}, {len(runs)} straight runs"
+    fitted = {c.name: (float(done.after.values[c.name]), c) for c in coordinates(done.after.values)}
+    _refuse_beyond({name: value for name, (value, _) in fitted.items()})
+    std = np.sqrt(np.diag(done.after.covariance))
+    numbers = {
+        name: _number(
+            file.numbers.get(name),
+            value,
+            coordinate.spread(value, float(std[k])),
+            coordinate.unit == 0.0,
+            source,
+        )
+        for k, (name, (value, coordinate)) in enumerate(fitted.items())
+        if np.isfinite(value)
+    }
+    return tuple(fitted), numbers
+
+
+def _brush(done: ForceExtension) -> dict[str, Number]:
+    """Return the numbers that were fitted to a force."""
+    case, after = done.case, done.after
+    source = f"{case.quantity} of {case.name}, {len(case.problem)} points"
+    numbers = dict(
+        stored_number(name, after.values[name], after.value_std(name), "fitted", source)
+        for name in after.names
+    )
+    _refuse_beyond({name: number.value for name, number in numbers.items()})
+    return numbers
+
+
+def _refuse_beyond(values: Mapping[str, float]) -> None:
+    """Raise FormatError for fitted values, by name in a file, that lie where no tire's can."""
+    faults = [
+        f"{name} after the fit: {fault}; the effect is not added"
+        for name, value in values.items()
+        if (fault := range_fault(name, value)) is not None
+    ]
+    if faults:
+        raise FormatError(faults)
+
+
+def _history_entry(
+    file: TireFile, done: Extension | ForceExtension, names: Sequence[str]
+) -> dict[str, Any]:
+    """Return what the history holds of a step that wrote these numbers, and of the file before it.
+
+    Without noise errors stand under names that end in their unit; unknown ones are left out.
+    """
+    suffix = "" if done.unit == "noise" else f"_{done.unit}"
+    return {
+        "action": done.action,
+        "effect": done.effect.name,
+        "strength": strength_told(done.strength),
+        "std": strength_told(done.std),
+        "unit": done.effect.unit,
+        **{f"{name}{suffix}": value for name, value in done.errors.items() if np.isfinite(value)},
+        "tirelib": __version__,
+        "before": {
+            "effects": list(file.extra.get("effects", [])),
+            "written": list(names),
+            "numbers": {n: _written(file.numbers[n]) for n in names if n in file.numbers},
+        },
+    }
 
 
 def undone_file(file: TireFile) -> tuple[TireFile, Mapping[str, Any]]:
@@ -169,7 +162,7 @@ def _number(old: Number | None, value: float, fit_std: float, factor: bool, sour
     return Number(value, std, "fitted", source, notes)
 
 
-def written(number: Number) -> dict[str, Any]:
+def _written(number: Number) -> dict[str, Any]:
     """Return a number as a history entry holds it."""
     table: dict[str, Any] = {
         "value_SI": number.value,

@@ -102,12 +102,7 @@ class Step(Generic[F]):
 def added(models: Models[F], effect: Effect, before: F | None = None) -> Step[F]:
     """Return a model with one effect more, everything fitted anew.
 
-    Parameters
-    ----------
-    models : Models
-    effect : Effect
-    before : Fit, optional
-        One of the models, with effects that were added before; the one without by default.
+    `before` is one of the models, with effects that were added before; the one without by default.
 
     Raises
     ------
@@ -146,21 +141,21 @@ def refuse_second(name: str, has: Sequence[Effect], effect: Effect) -> None:
         )
 
 
-def kept(name: str, has: Sequence[Effect], effect: Effect, acts_on: str) -> list[int]:
-    """Return the places of the effects that stay where one is removed.
-
-    Raises
-    ------
-    ParameterError
-        If the model does not have the effect.
-    """
+def refuse_absent(name: str, has: Sequence[Effect], effect: Effect, acts_on: str) -> None:
+    """Raise ParameterError if a model, by its name, does not have an effect."""
     names = [each.name for each in has]
     if effect.name not in names:
         raise ParameterError(
             f"{name}: it has no effect {effect.name!r} of {acts_on} to remove; it has "
             f"{', '.join(names) or 'none'}"
         )
-    return [k for k, each in enumerate(names) if each != effect.name]
+
+
+def without(fit: Fit, effect: Effect) -> tuple[tuple[Effect, ...], tuple[FloatArray, ...]]:
+    """Return the effects of a fit but one, and their strengths."""
+    names = [each.name for each in fit.effects]
+    stays = [k for k, name in enumerate(names) if name != effect.name]
+    return tuple(fit.effects[k] for k in stays), tuple(fit.strengths[k] for k in stays)
 
 
 def _judged(
@@ -179,12 +174,8 @@ def _judged(
         flags.append("not_significant")
     if action == "add" and after.error >= before.error * (1.0 - 1e-6):
         flags.append("no_gain")
-    counted = [
-        new > old
-        for new, old, fold in zip(held_after, held_before, folds, strict=True)
-        if fold.main
-    ]
-    if any(counted):
+    pairs = zip(held_after, held_before, folds, strict=True)
+    if any(new > old for new, old, fold in pairs if fold.main):
         flags.append("heldout_worse")
     return Step(
         action,

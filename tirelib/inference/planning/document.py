@@ -10,7 +10,7 @@ from tirelib.core.quantities import QUANTITIES
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.inference.compare.forces import UNITS
 from tirelib.inference.diagnose.diagnose import FALSE_ALARM
-from tirelib.inference.diagnose.forces.assess import ForceCase
+from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.diagnose.forces.models import plain_tires
 from tirelib.inference.planning.criterion import ENDLESS, NOTHING, WANTED, NextTest, PairForecast
 from tirelib.inference.planning.envelope import AXES, Envelope

@@ -7,7 +7,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.inference.compare.force_model import ForceModel
-from tirelib.inference.diagnose.forces.assess import ForceCase
+from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.identify.force_bench import ForceBench
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.identify.force_points import ForcePoints

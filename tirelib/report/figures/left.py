@@ -4,8 +4,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.quantities import QUANTITIES
-from tirelib.inference.diagnose.document import Assessment
-from tirelib.inference.diagnose.forces.assess import ForceAssessment
+from tirelib.inference.diagnose.assess import Assessment, ForceAssessment
 from tirelib.inference.diagnose.forces.fit import ForceFit
 from tirelib.inference.diagnose.left import Left, left_of
 from tirelib.inference.identify.error_bands import levels

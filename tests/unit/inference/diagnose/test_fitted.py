@@ -18,7 +18,7 @@ from tirelib.effects.state import State
 from tirelib.inference.compare.error import Yardstick, error_of
 from tirelib.inference.compare.model import model_of
 from tirelib.inference.diagnose.diagnose import plain_tires
-from tirelib.inference.diagnose.fitted import Fitted, fitted, least_error
+from tirelib.inference.diagnose.strain_models import Fitted
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.identify.delay import UNIT, by_delay, earlier, late
 from tirelib.inference.problems.strain import WIDTH, StrainProblem
@@ -44,7 +44,7 @@ def base_of(
     measured: StraightRuns, values: Mapping[str, float | FloatArray] | None = None
 ) -> Fitted:
     found = hypotheses(measured, values or values_of(TIRE))
-    return fitted(found, found.base, Yardstick.of(measured))
+    return Fitted.of(found, found.base, Yardstick.of(measured))
 
 
 def delay_of(model: Fitted) -> float:
@@ -97,7 +97,7 @@ def test_no_coordinate_goes_much_lower(plain: Fitted, k: int) -> None:
 def test_no_other_numbers_have_less_than_the_least_error(lacking: Fitted) -> None:
     measured = runs(EFFECT, STRENGTH)
     yardstick = Yardstick.of(measured)
-    given, least = least_error(lacking, model_of(model_file()), yardstick)
+    given, least = lacking.least_error(model_of(model_file()), yardstick)
     assert given.value == pytest.approx(error_of(measured, model_of(model_file())).value)
     assert least.value < min(given.value, lacking.error)
 
@@ -111,7 +111,7 @@ def test_no_other_numbers_have_less_than_the_least_error(lacking: Fitted) -> Non
 
 def test_numbers_that_have_the_least_error_already_are_kept(plain: Fitted) -> None:
     measured = runs()
-    given, least = least_error(plain, plain.model, Yardstick.of(measured))
+    given, least = plain.least_error(plain.model, Yardstick.of(measured))
     assert given.value == pytest.approx(plain.error, rel=1e-6)
     assert 0.9 * given.value < least.value <= given.value
 
@@ -183,7 +183,7 @@ def test_a_law_that_ends_at_zero_is_fitted_from_there(lacking: Fitted, side: flo
     among = hypotheses(measured, lacking.values, law)
     found = among.at(("softer",))
     assert found is not None
-    with_it = fitted(among, found, Yardstick.of(measured))
+    with_it = Fitted.of(among, found, Yardstick.of(measured))
     assert side * with_it.strengths[0][0] > 0.1
     assert with_it.error < 0.7 * lacking.error
 
@@ -229,10 +229,10 @@ def test_a_late_campaign_is_fitted_as_well_as_one_on_time(plain: Fitted) -> None
 def test_an_effect_that_comes_late_is_told_from_a_delay(lag: tuple[float, float]) -> None:
     measured = runs("low_pass", lag)
     among = hypotheses(measured, values_of(TIRE), CATALOGUE["low_pass"])
-    base = fitted(among, among.base, Yardstick.of(measured))
+    base = Fitted.of(among, among.base, Yardstick.of(measured))
     found = among.at(("low_pass",))
     assert found is not None
-    after = fitted(among, found, Yardstick.of(measured))
+    after = Fitted.of(among, found, Yardstick.of(measured))
     assert (np.abs(after.strengths[0] - lag) < 3.0 * after.strength_std(0)).all()
     assert (after.strength_std(0) < 0.05).all()
     assert abs(delay_of(after)) < 2.0 * delay_std(after)

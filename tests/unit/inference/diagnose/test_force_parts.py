@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from tests.unit.inference.force_points import ANGLES, LOADS, MODEL, PRESSURES, VALUES
-from tirelib.effects import CATALOGUE, effect
-from tirelib.inference.diagnose.forces.diagnose import diagnose_force
+from tirelib.effects import CATALOGUE, Effect, effect
+from tirelib.inference.diagnose.forces.case import ForceCase
+from tirelib.inference.diagnose.forces.diagnose import ForceDiagnosis, diagnose_force
 from tirelib.inference.diagnose.forces.fit import MeasuredForce, fit_force
-from tirelib.inference.diagnose.forces.held_out import errors_of, force_folds
-from tirelib.inference.diagnose.forces.left import left_of
-from tirelib.inference.diagnose.held_out import Fold, pooled
+from tirelib.inference.diagnose.forces.models import held_out
+from tirelib.inference.diagnose.held_out import Fold, force_folds, pooled
+from tirelib.inference.diagnose.left import force_left
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.identify.force_points import force_points
 from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
@@ -47,6 +48,10 @@ def problem(
     return MeasuredForce.of(MODEL.bench(force_points(data)), "Fy", noise)
 
 
+def diagnosed(made: MeasuredForce, *catalogue: Effect) -> ForceDiagnosis:
+    return diagnose_force(ForceCase("made", MODEL, made, made, 5.0, 2, ()), catalogue)
+
+
 def test_steady_runs_hold_out_their_highest_set_points() -> None:
     folds = force_folds(problem())
     assert [fold.name for fold in folds] == ["load"]  # two pressures: none can be spared
@@ -70,7 +75,7 @@ def test_what_is_held_out_does_not_move_the_fit_that_predicts_it() -> None:
     fit = fit_force(made, VALUES | {"friction": 0.95})
     (fold,) = force_folds(made)
     far = replace(made, measured=made.measured + 1e4 * fold.out)
-    (near,), (error,) = errors_of(made, fit, [fold]), errors_of(far, fit, [fold])
+    near, error = held_out(made, fit, fold), held_out(far, fit, fold)
     # without a change of the fit 1e4 N are missed as a whole, beside a few
     assert error == pytest.approx(1e4, abs=2.0 * near)
 
@@ -118,7 +123,7 @@ def test_the_held_out_error_is_over_the_points_of_the_folds_that_count() -> None
 def test_what_is_left_is_told_by_slip_and_load_with_a_guess() -> None:
     made = problem(friction_power=-0.15)
     base = fit_force(made, VALUES | {"friction": 0.95})
-    left = left_of(made, base)
+    left = force_left(made, base)
     assert left.guess is not None
     assert "ln load" in left.guess
     taken = re.search(r"takes away (\d+) %", left.guess)
@@ -137,9 +142,7 @@ def test_a_law_of_the_same_kind_stands_beside_the_catalogues_as_a_twin() -> None
         "Friction over load once more."
         return CATALOGUE["friction_load"].law(state, -0.5 * strength)
 
-    found = diagnose_force(
-        problem(friction_power=-0.15), VALUES, [CATALOGUE["friction_load"], sticky], noise=5.0
-    )
+    found = diagnosed(problem(friction_power=-0.15), CATALOGUE["friction_load"], sticky)
     assert found.verdict.kind == "indistinguishable"
     assert set(found.named) == {"friction_load", "sticky"}
     twins = {finding.effect.name: dict(finding.twins) for finding in found.findings}
@@ -154,16 +157,16 @@ def test_what_could_not_be_true_is_not_named() -> None:
         return CATALOGUE["friction_load"].law(state, -strength)
 
     measured = problem(friction_power=-0.15)
-    both = diagnose_force(measured, VALUES, [CATALOGUE["friction_load"], wrong], noise=5.0)
+    both = diagnosed(measured, CATALOGUE["friction_load"], wrong)
     assert both.named == ("friction_load",)
-    alone = diagnose_force(measured, VALUES, [wrong], noise=5.0)
+    alone = diagnosed(measured, wrong)
     assert (alone.verdict.kind, alone.named) == ("unknown", ())
     assert alone.final is alone.base
 
 
 def test_errors_fall_from_step_to_step_to_that_of_the_final_model() -> None:
     made = problem(friction_power=-0.15)
-    found = diagnose_force(made, VALUES, list(CATALOGUE.values()), noise=5.0)
+    found = diagnosed(made, *CATALOGUE.values())
     assert found.named == ("friction_load",)
     ((name, fit),) = found.steps
     assert name == "friction_load"

@@ -15,10 +15,9 @@ from tirelib.inference.compare.error import Yardstick, error_of
 from tirelib.inference.compare.model import TireModel, model_of
 from tirelib.inference.diagnose.diagnose import plain_tires
 from tirelib.inference.diagnose.document import next_test
-from tirelib.inference.diagnose.fitted import Fitted, fitted
-from tirelib.inference.diagnose.floor import floor_of
-from tirelib.inference.diagnose.held_out import folds, held_out, pooled
+from tirelib.inference.diagnose.held_out import pooled, strain_folds
 from tirelib.inference.diagnose.left import left_of, told_range
+from tirelib.inference.diagnose.strain_models import Fitted, floor_of
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.problems.strain import StrainProblem
 from tirelib.inference.statistics.select import Hypotheses
@@ -30,7 +29,7 @@ def base_of(measured: StraightRuns) -> Fitted:
     """Return the base model fitted to runs, among hypotheses of the whole catalogue."""
     problem = StrainProblem(measured, values_of(TIRE), list(CATALOGUE.values()))
     among = Hypotheses(problem, plain_tires())
-    return fitted(among, among.base, Yardstick.of(measured))
+    return Fitted.of(among, among.base, Yardstick.of(measured))
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +59,7 @@ def test_a_misfit_is_told_where_it_is_and_how_it_grows(plain: Fitted) -> None:
 
 def test_the_highest_load_and_the_highest_pressure_are_held_out() -> None:
     data = runs().data(with_deflection=False)
-    load, pressure = folds(data)
+    load, pressure = strain_folds(data)
     assert (data.points.load[load.out] == LOADS[-1]).all()
     assert (data.points.load[~load.out] < LOADS[-1]).all()
     assert (data.points.pressure[pressure.out] == 2.3e5).all()
@@ -70,11 +69,11 @@ def test_the_highest_load_and_the_highest_pressure_are_held_out() -> None:
 def test_two_loads_or_one_pressure_are_not_held_out() -> None:
     data = runs().data(with_deflection=False)
     few = (data.points.load < 5000.0) & (data.points.pressure < 2e5)
-    assert folds(replace(data, points=data.points.take(few))) == ()
+    assert strain_folds(replace(data, points=data.points.take(few))) == ()
 
 
 def test_pooled_errors_are_weighed_by_runs_and_nothing_is_no_number() -> None:
-    chosen = folds(runs().data(with_deflection=False))
+    chosen = strain_folds(runs().data(with_deflection=False))
     counts = [int(fold.out.sum()) for fold in chosen]
     expected = np.sqrt((counts[0] * 9.0 + counts[1] * 16.0) / sum(counts))
     assert pooled((3.0, 4.0), chosen) == pytest.approx(expected)
@@ -86,7 +85,7 @@ def test_held_out_errors_are_of_runs_that_the_fit_has_not_seen(
     plain: Fitted, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data = runs().data()
-    (load, _), seen = folds(data), []
+    (load, _), seen = strain_folds(data), []
 
     def trained(_: Fitted, out: BoolArray) -> tuple[TireModel, float]:
         seen.append(data.points.load[~out])
@@ -95,7 +94,7 @@ def test_held_out_errors_are_of_runs_that_the_fit_has_not_seen(
     monkeypatch.setattr(Fitted, "without_runs", trained)
     strain = data.strain + 1e-3 * load.out[:, None] * np.cos(3.0 * GRID)
     spoiled = Yardstick.of(replace(runs(), strain=strain))
-    error = held_out(plain, load, spoiled)
+    error = plain.held_out(load, spoiled)
     assert error is not None
     assert seen[0].max() < LOADS[-1]
     assert error.value == pytest.approx(spoiled.take(load.out).error(plain.model, 0.0).value)
@@ -104,7 +103,7 @@ def test_held_out_errors_are_of_runs_that_the_fit_has_not_seen(
 
 def test_what_is_held_out_moves_no_number(plain: Fitted) -> None:
     """Spoiled runs that are left out change nothing; the same runs in the fit do."""
-    load, _ = folds(runs().data())
+    load, _ = strain_folds(runs().data())
     strain = runs().strain + 1e-4 * load.out[:, None] * np.cos(3.0 * GRID)
     spoiled = base_of(replace(runs(), strain=strain))
     alone, _ = plain.without_runs(load.out)

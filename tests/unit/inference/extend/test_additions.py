@@ -13,8 +13,8 @@ from tirelib.core.errors import ParameterError
 from tirelib.core.parameters import TireFile
 from tirelib.effects import CATALOGUE
 from tirelib.inference.compare.model import model_of
+from tirelib.inference.diagnose.assess import ForceAssessment
 from tirelib.inference.diagnose.diagnose import Diagnosis, diagnose
-from tirelib.inference.diagnose.forces.assess import ForceAssessment
 from tirelib.inference.extend.additions import additions
 from tirelib.inference.extend.extension import extended
 from tirelib.inference.statistics import select

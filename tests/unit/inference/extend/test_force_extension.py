@@ -10,9 +10,9 @@ from tests.unit.inference.force_campaigns import brush_file, steady_runs, write_
 from tirelib.core.errors import FormatError, ParameterError
 from tirelib.core.parameters import TireFile, read_tire, write_tire
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.inference.diagnose.forces.assess import ForceCase, force_case, force_cases
-from tirelib.inference.extend.force_document import force_extended_file, force_extension_document
-from tirelib.inference.extend.force_extension import (
+from tirelib.inference.diagnose.forces.case import ForceCase, force_case, force_cases
+from tirelib.inference.extend.document import extension_document
+from tirelib.inference.extend.extension import (
     ForceExtension,
     case_for,
     extended_brush,
@@ -20,7 +20,7 @@ from tirelib.inference.extend.force_extension import (
     refuse_brush,
     remove_brush_effect,
 )
-from tirelib.inference.extend.model_file import undone_file
+from tirelib.inference.extend.model_file import extended_file, undone_file
 from tirelib.journey import add
 from tirelib.report.figures.before_after import waterfall_of
 
@@ -88,7 +88,7 @@ def test_the_file_holds_what_was_fitted_and_comes_back(
     # a number that the file did not state is gone again after an undo
     stated = {name: number for name, number in model.numbers.items() if name != "Fy_offset"}
     bare = replace(model, numbers=stated)
-    file = force_extended_file(bare, added, "hash")
+    file = extended_file(bare, added, "hash")
     assert "Fy_offset" in file.numbers
     write_tire(file, tmp_path / "M2.toml", "tirelib-model/1")
     back = read_tire(tmp_path / "M2.toml")
@@ -118,7 +118,7 @@ def read_back(file: TireFile, folder: Path) -> TireFile:
 def test_errors_are_told_in_the_noise_of_a_point(
     added: ForceExtension, case: ForceCase, model: TireFile
 ) -> None:
-    document = force_extension_document(added, force_extended_file(model, added, "hash"))
+    document = extension_document(added, extended_file(model, added, "hash"))
     assert document["error_before"] == pytest.approx(case.given)
     assert document["error_refitted"] == pytest.approx(added.before.error / case.noise)
     assert document["heldout_error_after"] == pytest.approx(added.held_after[0] / case.noise)
@@ -143,7 +143,7 @@ def test_an_effect_is_fitted_to_the_force_of_the_last_step(
     added: ForceExtension, model: TireFile, tmp_path: Path
 ) -> None:
     campaign = write_forces(tmp_path / "steady", steady_runs(slope=SLOPE), "steady")
-    file = force_extended_file(model, added, "hash")
+    file = extended_file(model, added, "hash")
     cases = force_cases(campaign, file, CATALOGUE)
     assert case_for(cases, CATALOGUE["carcass"]).quantity == "Fy"
     with pytest.raises(ParameterError, match="has the effect 'friction_load' already"):
@@ -154,7 +154,7 @@ def test_a_number_that_no_tire_has_is_not_written(added: ForceExtension, model: 
     wild = dict(added.after.values) | {"friction": 50.0}
     broken = replace(added, after=replace(added.after, values=wild))
     with pytest.raises(FormatError, match="friction after the fit"):
-        force_extended_file(model, broken, "hash")
+        extended_file(model, broken, "hash")
 
 
 def test_the_fall_is_shown_by_quantity_in_one_unit() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.unit.inference.force_points import MODEL
 from tirelib.core.arrays import FloatArray
-from tirelib.inference.diagnose.forces.assess import ForceCase
+from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.diagnose.forces.fit import MeasuredForce
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.identify.force_points import force_points

@@ -10,8 +10,9 @@ from tests.unit.inference.planning.drifting import NOISE, PRESSURES, case, side_
 from tirelib.cli.next_test import _idle
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
-from tirelib.inference.diagnose.forces.assess import ForceAssessment, ForceCase, assess_forces
-from tirelib.inference.diagnose.forces.document import force_diagnosis_document
+from tirelib.inference.diagnose.assess import ForceAssessment, assess_forces
+from tirelib.inference.diagnose.document import diagnosis_document
+from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.diagnose.forces.models import plain_tires
 from tirelib.inference.planning.criterion import NOTHING, NextTest
 from tirelib.inference.planning.document import Plan, advice, plan_document, plan_force_test
@@ -72,7 +73,7 @@ def test_what_serves_as_well_is_indistinguishable_and_the_test_is_told() -> None
     assert assess_forces(case("wear", 0.08, seed=2), BRUSH).named == ("friction_drift",)
     assert found.verdict == "indistinguishable"
     assert set(PAIR) <= set(found.named)
-    document = force_diagnosis_document(found)
+    document = diagnosis_document(found)
     assert document["sets"] == [[name] for name in found.named]
     assert document["next_test"]["between"] == list(found.named)
     assert "repeat the first pressure at the end" in document["next_test"]["what"]
@@ -80,7 +81,7 @@ def test_what_serves_as_well_is_indistinguishable_and_the_test_is_told() -> None
 
 
 def test_beside_sure_names_what_would_serve_as_well_is_on_trial() -> None:
-    document = force_diagnosis_document(told("pressure", 0.35))
+    document = diagnosis_document(told("pressure", 0.35))
     sets = [["carcass", PAIR[0]], ["carcass", PAIR[1]]]
     document |= {"verdict": "form_inadequate", "named": sets[0], "sets": sets}
     found = suspects_of(document, CATALOGUE)

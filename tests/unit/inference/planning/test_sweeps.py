@@ -9,7 +9,7 @@ import pytest
 from tests.unit.inference.planning.drifting import PRESSURES, case
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
-from tirelib.inference.diagnose.forces.assess import ForceCase
+from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.identify.force_points import ForcePoints, force_points
 from tirelib.inference.planning.document import Plan, plan_document, plan_force_test
 from tirelib.inference.planning.envelope import Envelope

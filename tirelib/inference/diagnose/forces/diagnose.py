@@ -1,18 +1,17 @@
 """Which effects a brush lacks, by the inference of the library (`tirelib.inference.statistics`)."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.core.arrays import FloatArray
 from tirelib.core.threads import one_thread
 from tirelib.effects import Effect
 from tirelib.inference.diagnose.diagnose import FALSE_ALARM, Finding, findings_of
-from tirelib.inference.diagnose.forces.fit import ForceFit, MeasuredForce
+from tirelib.inference.diagnose.forces.case import ForceCase
+from tirelib.inference.diagnose.forces.fit import ForceFit
 from tirelib.inference.diagnose.forces.models import ForceModels, plain_tires
 from tirelib.inference.diagnose.held_out import pooled
-from tirelib.inference.problems.forces import ForceProblem
 from tirelib.inference.statistics.select import Verdict, select
 
 Steps = tuple[tuple[str, ForceFit], ...]
@@ -66,50 +65,24 @@ class ForceDiagnosis:
 
 @one_thread()
 def diagnose_force(
-    problem: MeasuredForce,
-    values: Mapping[str, float],
+    case: ForceCase,
     catalogue: Sequence[Effect],
     *,
-    noise: float,
-    effects: Sequence[Effect] = (),
-    strengths: Sequence[FloatArray] = (),
     false_alarm: float = FALSE_ALARM,
     progress: Callable[[str], None] | None = None,
 ) -> ForceDiagnosis:
-    """Tell which effects of a catalogue a brush lacks.
+    """Tell which effects of a catalogue a brush lacks; those of stage brush are tried.
 
-    Parameters
-    ----------
-    problem : MeasuredForce
-    values : mapping
-        Numbers of the model's brush.
-    catalogue : sequence of Effect
-        Those of stage brush are tried.
-    noise : float, [N] or [N m]
-        Standard deviation of a point, from repeats; NaN without.
-    effects, strengths
-        That the model has already.
-    false_alarm : float
-        Probability with which a plain tire is said to lack something.
-    progress : callable, optional
+    `false_alarm` is the probability with which a plain tire is said to lack something.
 
     Raises
     ------
     ConvergenceError
         If the brush cannot be fitted to the points.
     """
-    given = ForceProblem(
-        problem.bench,
-        problem.quantity,
-        values,
-        catalogue,
-        noise=noise,
-        effects=effects,
-        strengths=strengths,
-    )
-    families = plain_tires(problem.quantity)
+    given, families = case.as_given(catalogue), plain_tires(case.quantity)
     verdict = select(given, families, false_alarm=false_alarm, many=True, progress=progress)
-    models = ForceModels(problem, given, false_alarm, verdict.hypotheses, progress)
+    models = ForceModels(case.problem, given, false_alarm, verdict.hypotheses, progress)
     base = models.at()
     every = dict.fromkeys(name for names in verdict.sets for name in names)
     alone = models.singles([verdict.hypotheses.effects[name] for name in every])
@@ -119,18 +92,16 @@ def diagnose_force(
         named, steps = tuple(every), ()
     else:
         named = tuple(name for name, _ in steps)
-    found = findings_of(verdict, given, problem.measured - base.predicted, lambda rows: rows)
-    return ForceDiagnosis(models, verdict, named, _ordered(found, named), base, final, alone, steps)
+    rest = case.problem.measured - base.predicted
+    found = _ordered(findings_of(verdict, given, rest, lambda rows: rows), named)
+    return ForceDiagnosis(models, verdict, named, found, base, final, alone, steps)
 
 
 def _ordered(findings: Sequence[Finding], named: Sequence[str]) -> tuple[Finding, ...]:
     """Return findings with the named ones first, in their order; what is not named is no alarm."""
     place = {name: k for k, name in enumerate(named)}
     findings = sorted(findings, key=lambda f: place.get(f.effect.name, len(place)))
-    return tuple(
-        replace(f, level="hint") if f.level == "alarm" and f.effect.name not in place else f
-        for f in findings
-    )
+    return tuple(f if f.effect.name in place else f.at_most_hint for f in findings)
 
 
 def _in_steps(models: ForceModels, verdict: Verdict, alone: Mapping[str, ForceFit]) -> Steps:

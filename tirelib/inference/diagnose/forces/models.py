@@ -10,10 +10,12 @@ from tirelib.core.errors import TirelibError
 from tirelib.core.forked import forked
 from tirelib.effects import Effect
 from tirelib.inference.diagnose.forces.fit import ForceFit, MeasuredForce, fit_force, with_effect
-from tirelib.inference.diagnose.forces.floor import force_floor
-from tirelib.inference.diagnose.forces.held_out import errors_of, force_folds
+from tirelib.inference.diagnose.held_out import Fold, force_folds
+from tirelib.inference.identify.span import span
 from tirelib.inference.problems.forces import ForceProblem
-from tirelib.inference.statistics.plain import Family, covering, load
+from tirelib.inference.statistics.hypothesis import Hypothesis
+from tirelib.inference.statistics.null import PRIOR
+from tirelib.inference.statistics.plain import BASE, ROUGHLY, Family, covering, load
 from tirelib.inference.statistics.select import Hypotheses
 
 TABLES = Path(__file__).parents[2] / "statistics"
@@ -39,11 +41,6 @@ class ForceModels:
     hypotheses : Hypotheses, optional
         About the given problem; made where they are asked for by default.
     progress : callable, optional
-
-    Attributes
-    ----------
-    folds : tuple of ForceFold
-        What can be left out in turn.
     """
 
     def __init__(
@@ -117,7 +114,7 @@ class ForceModels:
             if self.progress is not None:
                 count = len(self.folds)
                 self.progress(f"holding out some of the points: {count} fits to the others")
-            self._held[fit] = errors_of(self.problem, fit, self.folds)
+            self._held[fit] = tuple(held_out(self.problem, fit, fold) for fold in self.folds)
         return self._held[fit]
 
     def floor(self, fit: ForceFit) -> float:
@@ -127,5 +124,42 @@ class ForceModels:
         """
         found = self.hypotheses.at(self.added(fit)) if self.given.noise_known else None
         if found is None:
-            return float(np.nan)
+            return float("nan")
         return force_floor(self.problem, fit, found, self.false_alarm)
+
+
+def held_out(problem: MeasuredForce, fit: ForceFit, fold: Fold) -> float:
+    """Return a model's rms on a fold's points after a fit to the others, [N] or [N m].
+
+    The fitted model is the start. NaN where the fit does not settle or the model fails there.
+    """
+    try:
+        trained = fit_force(problem.take(~fold.out), fit.values, fit.effects, fit.strengths)
+        seen = problem.take(fold.out)
+        found = seen.predict(trained.values, trained.changes)
+        return float(np.sqrt(np.mean((seen.measured - found) ** 2)))
+    except TirelibError:
+        return float("nan")
+
+
+def force_floor(
+    problem: MeasuredForce, fit: ForceFit, hypothesis: Hypothesis, alpha: float
+) -> float:
+    """Return the part of a fitted brush's rms that noise and what plain tires show explain, SI.
+
+    It is all of it unless the hypothesis that the fit's effects and no other are there is rejected;
+    then it is what is left when the model takes what stands out most, and laws of its effects that
+    are off by as much as themselves.
+    """
+    if hypothesis.p > alpha:
+        return fit.error
+    blocks = hypothesis.fit.rows
+    more = [rows for name, rows in blocks.items() if name.startswith(ROUGHLY)]
+    if not hypothesis.against.startswith(ROUGHLY):
+        more.append(PRIOR * blocks[hypothesis.against])
+    basis = span(blocks[BASE].T)
+    rows = np.concatenate(more) / problem.scale
+    rows = rows - (rows @ basis) @ basis.T
+    left = (problem.measured - fit.predicted) / problem.scale
+    taken = np.linalg.solve(rows @ rows.T + np.eye(len(rows)), rows @ left) @ rows
+    return min(fit.error, problem.scale * float(np.sqrt(np.mean((left - taken) ** 2))))

@@ -1,0 +1,179 @@
+"""One force of a campaign with a model's brush, ready to be fitted and diagnosed."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tirelib.campaign import Campaign
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError
+from tirelib.core.parameters import TireFile
+from tirelib.effects import Effect
+from tirelib.inference.compare.force_model import (
+    ForceModel,
+    force_model_of,
+    quantities_of,
+    slips,
+    usable_points,
+)
+from tirelib.inference.compare.forces import UNITS
+from tirelib.inference.diagnose.forces.fit import ForceFit, MeasuredForce
+from tirelib.inference.identify.force_bench import Changes
+from tirelib.inference.identify.force_data import force_data
+from tirelib.inference.identify.force_noise import force_noise
+from tirelib.inference.identify.force_notes import noise_note, taken_as_zero
+from tirelib.inference.identify.force_points import ForcePoints, force_points
+from tirelib.inference.problems.forces import ForceProblem
+
+MOST_POINTS = 4000
+"""Points that are fitted; of a longer sweep passes are left out evenly."""
+LEAST_POINTS = 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceCase:
+    """One force of a campaign, ready to be fitted.
+
+    Attributes
+    ----------
+    name : str
+        Name of the campaign.
+    model : ForceModel
+    problem : MeasuredForce
+        At the points that are fitted.
+    whole : MeasuredForce
+        At all points, for which errors are reported.
+    noise : float, [N] or [N m]
+        Standard deviation of a point; NaN without repeats.
+    repeats : int
+    messages : tuple of str
+    """
+
+    name: str
+    model: ForceModel
+    problem: MeasuredForce
+    whole: MeasuredForce
+    noise: float
+    repeats: int
+    messages: tuple[str, ...]
+
+    @property
+    def quantity(self) -> str:
+        """Fy, Fx or Mz."""
+        return self.problem.quantity
+
+    @property
+    def unit(self) -> str:
+        """Unit of errors: noise, N or Nm."""
+        return "noise" if np.isfinite(self.noise) else UNITS[self.quantity]
+
+    @property
+    def factor(self) -> float:
+        """Factor from an rms in SI to an error in the unit of the document."""
+        return 1.0 / self.noise if np.isfinite(self.noise) else 1.0
+
+    def rms(self, values: Mapping[str, float], changes: Changes) -> float:
+        """Return the rms of measured less predicted over all points, SI."""
+        rest = self.whole.measured - self.whole.predict(values, changes)
+        return float(np.sqrt(np.mean(rest**2)))
+
+    def error(self, fit: ForceFit) -> float:
+        """Return the error of a fitted brush in the unit of the document."""
+        return self.factor * self.rms(fit.values, fit.changes)
+
+    def told(self, part: float, fit: ForceFit) -> float:
+        """Return a part of a fitted brush's rms, SI, as a part of its error."""
+        return self.error(fit) * part / fit.error
+
+    @property
+    def given(self) -> float:
+        """The error of the model as its file has it."""
+        return self.factor * self.rms(self.model.values, self.model.changes)
+
+    @property
+    def effects(self) -> list[Effect]:
+        """Effects that the model has."""
+        return [used.effect for used in self.model.used]
+
+    @property
+    def strengths(self) -> list[FloatArray]:
+        """Their strengths, arrays of components."""
+        return [used.components for used in self.model.used]
+
+    def as_given(self, catalogue: Sequence[Effect]) -> ForceProblem:
+        """Return the force as the inference sees it, about the model as its file has it."""
+        return ForceProblem(
+            self.problem.bench,
+            self.quantity,
+            self.model.values,
+            catalogue,
+            noise=self.noise,
+            effects=self.effects,
+            strengths=self.strengths,
+        )
+
+
+def force_case(
+    campaign: Campaign, file: TireFile, effects: Mapping[str, Effect], quantity: str | None
+) -> ForceCase:
+    """Return the force of a campaign that is asked for, else the one with the largest lack of fit.
+
+    Errors are those of `force_cases`.
+    """
+
+    def lack(case: ForceCase) -> float:
+        if np.isfinite(case.noise):
+            return case.given
+        return case.given / float(np.sqrt(np.mean(case.whole.measured**2)))
+
+    return max(force_cases(campaign, file, effects, quantity), key=lack)
+
+
+def force_cases(
+    campaign: Campaign, file: TireFile, effects: Mapping[str, Effect], quantity: str | None = None
+) -> list[ForceCase]:
+    """Return the force that is asked for, else every force to which the slips matter.
+
+    Raises
+    ------
+    CalibrationError
+        If the model has no brush, the force is not measured, or there are too few points.
+    """
+    model = force_model_of(file, effects)
+    points = force_points(force_data(campaign))
+    wanted = quantities_of(campaign, points, quantity)
+    points = usable_points(campaign, model, points)
+    notes = taken_as_zero(campaign)
+    return [_case(campaign.header.name, model, points, name, notes) for name in wanted]
+
+
+def _case(
+    name: str, model: ForceModel, points: ForcePoints, quantity: str, notes: Sequence[str]
+) -> ForceCase:
+    points = points.take(np.isfinite(getattr(points.data, quantity)))
+    if len(points) < LEAST_POINTS:
+        raise CalibrationError(
+            f"{name}: {quantity} is measured at {len(points)} points; {LEAST_POINTS} are needed to "
+            "tell effects apart; add runs with other loads, pressures and slips"
+        )
+    if not slips(points.data, quantity):
+        slip = "slip ratio" if quantity == "Fx" else "slip angle"
+        raise CalibrationError(
+            f"{name}: one {slip} only, so {quantity} says nothing about the brush; "
+            "add runs with slip"
+        )
+    messages = list(notes)
+    whole = points
+    if len(points) > MOST_POINTS:
+        step = int(np.ceil(len(points) / MOST_POINTS))
+        points = points.take(np.arange(0, len(points), step))
+        messages.append(
+            f"{len(whole)} points, passes of the sweep; one in {step} is fitted ({len(points)})"
+        )
+    measured = getattr(whole.data, quantity)
+    noise, _, repeats = force_noise(whole, measured)
+    messages += noise_note(quantity, noise, float(np.sqrt(np.mean(measured**2))))
+    problem = MeasuredForce.of(model.bench(points), quantity, noise)
+    every = MeasuredForce.of(model.bench(whole), quantity, noise)
+    return ForceCase(name, model, problem, every, noise, repeats, tuple(messages))
