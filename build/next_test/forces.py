@@ -24,7 +24,7 @@ from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.diagnose.forces.fit import MeasuredForce
 from tirelib.inference.diagnose.forces.models import plain_tires
 from tirelib.inference.identify.brush_fit import fit_brush
-from tirelib.inference.identify.brush_model import BrushModel
+from tirelib.inference.identify.brush_law import BrushModel
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.identify.force_points import force_points
 from tirelib.inference.planning.envelope import Envelope
@@ -257,7 +257,7 @@ def measured(test: PairCase) -> dict[str, Any]:
     declared = {name: ends for name, ends in ENVELOPE.items() if name in axes}
     plan = next_test(among, suspects, force_envelope(case, **declared), model=case.model)
     out: dict[str, Any] = {"strength": tire.strength, "before": test.told(among)}
-    if len(plan.trial.rivals) < 2:
+    if len(plan.rivals) < 2:
         return out
     for name, k in (("random", test.any_of(len(plan.points))), ("chosen", 0)):
         after = _with_run(case, plan.envelope, plan.points[k], tire, 0)
@@ -266,7 +266,7 @@ def measured(test: PairCase) -> dict[str, Any]:
     out["second"] = out["chosen"]
     if open_still(out["chosen"]):
         more = next_test(among, suspects, force_envelope(after, **declared), model=case.model)
-        if len(more.trial.rivals) == 2:
+        if len(more.rivals) == 2:
             both = _with_run(after, more.envelope, more.points[0], tire, 1)
             out["second"] = test.told(hypotheses_of(both)) | foretold(more, 0)
     return out

@@ -10,7 +10,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
-from tirelib.inference.planning.criterion import NextTest
+from tirelib.inference.planning.next_test import NextTest
 from tirelib.inference.statistics.select import Hypotheses
 
 CACHE = Path(__file__).parents[1] / "out" / "next_test"

@@ -15,7 +15,7 @@ from tests.synthetic import LATERAL, RATE, header
 from tests.unit.inference.compare.compare_synthetic import bump, model_file, plan, points_of
 from tirelib.campaign import Run, RunPlan, write_campaign
 from tirelib.core.parameters import Number, TireFile, write_tire
-from tirelib.inference.identify.brush_model import brush_of
+from tirelib.inference.identify.brush_law import brush_of
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID

@@ -20,7 +20,7 @@ from tirelib.campaign import (
 )
 from tirelib.cli import program
 from tirelib.core.parameters import read_tire, write_tire
-from tirelib.inference.identify.brush_model import brush_of
+from tirelib.inference.identify.brush_law import brush_of
 from tirelib.inference.identify.force_data import force_data
 from tirelib.inference.identify.ring_patch import half_lengths
 from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces

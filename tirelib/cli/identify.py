@@ -95,7 +95,7 @@ def identify(
 ) -> None:
     """Fit the base model, ring and brush, to DIR."""
     from tirelib.core.parameters import read_tire, write_tire
-    from tirelib.inference.identify.forces_document import whole_document
+    from tirelib.inference.identify.document import whole_document
     from tirelib.inference.identify.whole import identify_whole
 
     start = read_tire(tire_file) if tire_file is not None else None

@@ -326,8 +326,8 @@ def _idle(candidates: "Sequence[Mapping[str, Any]]", keys: list[str]) -> set[str
 
 
 def _say(document: dict[str, Any]) -> None:
-    from tirelib.inference.planning.criterion import LEAST_SEPARATION
     from tirelib.inference.planning.envelope import AXES
+    from tirelib.inference.planning.next_test import LEAST_SEPARATION
 
     console = output()
     console.print(f"{document['campaign']}, {document['quantity']}: {document['why']}")

@@ -8,7 +8,6 @@ from plotly.subplots import make_subplots
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.quantities import QUANTITIES
-from tirelib.inference.planning.criterion import NOTHING, NextTest, PairForecast
 from tirelib.inference.planning.document import PROMISING, STRUCTURE, Plan, advice, plan_document
 from tirelib.inference.planning.envelope import AXES
 from tirelib.report.figures.compare_plot import Plot, dots, line, styled_figure
@@ -54,7 +53,7 @@ def _summary(plan: Plan) -> str:
 def _messages(plan: Plan) -> list[str]:
     if plan.test is None:
         return []
-    return [f"{name} is left out: {why}" for name, why in plan.test.trial.left_out.items()]
+    return [f"{name} is left out: {why}" for name, why in plan.test.left_out.items()]
 
 
 def parts_of(plan: Plan) -> list[Part]:
@@ -230,7 +229,7 @@ def _row(test: NextTest, pair: PairForecast, k: int) -> list[float]:
 def _suspects(test: NextTest) -> Table:
     return Table.of(
         "Suspects",
-        test.trial.rivals,
+        test.rivals,
         {
             "suspect": lambda rival: rival.name.replace(NOTHING, "no effect"),
             "in range": lambda rival: "yes" if rival.in_range else "no",

@@ -36,7 +36,7 @@ LOADED = (
     "tirelib.inference.diagnose.document",
     "tirelib.effects.load",
     "tirelib.inference.extend.document",
-    "tirelib.inference.identify.forces_document",
+    "tirelib.inference.identify.document",
     "tirelib.inference.identify.whole",
     "tirelib.model.registration",
     "tirelib.measured.waveforms",

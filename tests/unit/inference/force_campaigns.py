@@ -11,7 +11,7 @@ from tests.synthetic import header
 from tirelib.campaign import Campaign, Run, RunPlan, read_campaign, write_campaign
 from tirelib.core.parameters import Number, TireFile
 from tirelib.inference.identify.brush_fit import fit_brush
-from tirelib.inference.identify.brush_model import stored_number
+from tirelib.inference.identify.brush_law import stored_number
 from tirelib.inference.identify.force_data import ForceData, force_data
 from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
 

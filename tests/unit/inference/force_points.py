@@ -6,8 +6,7 @@ import numpy as np
 
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.inference.compare.force_model import ForceModel
-from tirelib.inference.identify.brush_law import Reference
-from tirelib.inference.identify.brush_model import BrushModel
+from tirelib.inference.identify.brush_law import BrushModel, Reference
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.identify.force_points import force_points
 from tirelib.inference.problems.forces import ForceProblem

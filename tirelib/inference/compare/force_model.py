@@ -12,7 +12,7 @@ from tirelib.core.errors import CalibrationError, FormatError, ParameterError
 from tirelib.core.parameters import TireFile
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.inference.compare.model import TireModel, UsedEffect, effects_of
-from tirelib.inference.identify.brush_model import BrushModel, brush_of
+from tirelib.inference.identify.brush_law import BrushModel, brush_of
 from tirelib.inference.identify.force_bench import Changes, ForceBench
 from tirelib.inference.identify.force_checks import ANGLE_SPAN, RATIO_SPAN
 from tirelib.inference.identify.force_data import FORCES, ForceData

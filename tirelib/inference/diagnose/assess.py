@@ -41,8 +41,6 @@ class Assessed:
 
     Attributes
     ----------
-    diagnosis : Diagnosis or ForceDiagnosis
-    verdict : str
     named : tuple of str
         Empty without repeats.
     findings : tuple of Finding
@@ -53,7 +51,6 @@ class Assessed:
         What is left out in turn; none of strain if nothing is named.
     singles : mapping of name to fit
         The model with one named effect alone, where that can be fitted.
-    messages : tuple of str
     """
 
     diagnosis: Any
@@ -184,7 +181,6 @@ class ForceAssessment(Assessed):
 
     Attributes
     ----------
-    case : ForceCase
     left : ForceLeft
         What no effect explains.
     """

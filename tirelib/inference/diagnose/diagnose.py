@@ -34,7 +34,6 @@ class Finding:
 
     Attributes
     ----------
-    effect : Effect
     score, threshold : float
         Standard score beside the model as it is, zero where it is not positive, and the score that
         plain tires exceed with the false-alarm probability.
@@ -43,7 +42,6 @@ class Finding:
     p, p_std : float
         p-value of the hypothesis that this effect is missing and no other.
     strength, std : shape (components,)
-    in_range : bool
     share : float
         Part of the squared error that this effect alone takes away, to first order.
     twins : tuple of (name, angle [rad])
@@ -103,7 +101,6 @@ class Diagnosis:
 
     Attributes
     ----------
-    verdict : Verdict
     named : tuple of str
         Effects of the smallest members of the confidence set, best first.
     findings : tuple of Finding

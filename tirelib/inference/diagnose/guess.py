@@ -39,7 +39,6 @@ class Term:
 
     Attributes
     ----------
-    shape : str
     powers : tuple of (condition, power)
     coefficient, std : float, [-]
         Strain at 4000 N, 2 bar and 20 m/s where the shape is one.
@@ -57,8 +56,6 @@ class Guess:
 
     Attributes
     ----------
-    terms : tuple of Term
-    explained : float
     powers : mapping of condition to Power
         With which the terms' shapes go, all alike and free, of the conditions that vary.
     """
@@ -88,7 +85,6 @@ def guess_law(
         Measured less model.
     waveform : shape (n_runs, n_phi), [-]
         Waveforms of the model.
-    points : Operating
     edges : shape (n_runs, 2), [rad]
         Edges of the contact.
     turned : callable

@@ -46,7 +46,6 @@ class Fitted:
 
     Attributes
     ----------
-    problem : StrainProblem
     hypotheses : Hypotheses
         About that problem.
     hypothesis : Hypothesis
@@ -231,7 +230,6 @@ class StrainModels:
     ----------
     problem : StrainProblem
         Its whitening is about the fitted model.
-    yardstick : Yardstick
     folds : tuple of Fold
         What can be left out in turn.
     """

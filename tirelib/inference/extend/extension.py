@@ -44,7 +44,6 @@ class Extension(Step[Fitted]):
         change.
     out_before, out_after : tuple of ModelError or None
         On what was held out, one per fold.
-    runs : StraightRuns
     """
 
     given: ModelError
@@ -77,7 +76,6 @@ class ForceExtension(Step[ForceFit]):
 
     Attributes
     ----------
-    case : ForceCase
     given : float
         Error of the model before the step as it was given, in the unit of errors.
     """

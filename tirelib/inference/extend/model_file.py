@@ -12,7 +12,7 @@ from tirelib.core.parameters.tire import range_fault
 from tirelib.core.version import __version__
 from tirelib.inference.diagnose.diagnose import strength_told
 from tirelib.inference.extend.extension import Extension, ForceExtension
-from tirelib.inference.identify.brush_model import stored_number
+from tirelib.inference.identify.brush_law import stored_number
 from tirelib.model.base import BARE, coordinates
 
 

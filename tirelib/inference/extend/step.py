@@ -72,10 +72,8 @@ class Step(Generic[F]):
     ----------
     action : str
         add or remove.
-    effect : Effect
     strength, std : shape (components,)
         With the effect, in its unit.
-    before, after : Fit
     floor : float
         Error that structure leaves.
     folds : tuple

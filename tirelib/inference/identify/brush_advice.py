@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from tirelib.core.arrays import FloatArray
-from tirelib.inference.identify.brush_cells import CellConditions, sliding_slips
+from tirelib.inference.identify.brush_cells import CellConditions
 from tirelib.inference.identify.brush_law import point_parameters
 from tirelib.inference.identify.brush_misfit import ForceMisfit, Shape, kernel
 from tirelib.inference.identify.brush_problem import ASSUMED_HALF_LENGTH, BrushProblem
@@ -44,10 +44,8 @@ class Candidate:
 
     Attributes
     ----------
-    words : str
     forces : tuple of str
         Recorded in it.
-    data : ForceData
     """
 
     words: str
@@ -60,12 +58,12 @@ def advice(study: Study) -> dict[str, str]:
     problem = _opened(study)
     z = problem.z_of(np.array([_value(study, name) for name in problem.names]))
     known = {each.cells.force: each for each in study.misfit.forces}
-    have = {name: _points(each.cells.at) for name, each in known.items()}
+    have = {name: each.cells.at for name, each in known.items()}
 
     def spread(added: Candidate | None) -> FloatArray:
         total = np.eye(z.size) / PRIOR**2
         for force in dict.fromkeys([*have, *(added.forces if added else ())]):
-            parts = [have[force]] if force in have else []
+            parts: list[ForceData | CellConditions] = [have[force]] if force in have else []
             parts += [added.data] if added and force in added.forces else []
             total += _information(study, problem, z, force, parts, known.get(force))
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(total))))
@@ -88,54 +86,30 @@ def candidates(study: Study) -> tuple[Candidate, ...]:
     data, fit = study.problem.data, study.fit
     load, pressure = fit.reference.load, fit.reference.pressure
     side = tuple(n for n in ("Fy", "Mz") if n in fit.rmse) or ("Fy", "Mz")
-    along = ("Fx",)
     slide = float(np.rad2deg(study.slide["slip_angle"]))
     far = min(np.ceil(1.3 * max(slide, 3.0)), LARGEST_ANGLE)
-    angles = np.array([-far, -0.8 * far, 0.8 * far, far])
-    small = np.array([s * a for a in _ANGLES for s in (-1.0, 1.0)])
+    large = np.deg2rad([-far, -0.8 * far, 0.8 * far, far])
+    small = np.deg2rad([s * a for a in _ANGLES for s in (-1.0, 1.0)])
     ratios = np.array([s * r for r in _RATIOS for s in (-1.0, 1.0)])
-    other = (
-        0.5 * float(data.load.min())
-        if np.ptp(data.load) < 0.3 * load
-        else 1.5 * float(data.load.max())
-    )
+    one_load = np.ptp(data.load) < 0.3 * load
+    other = 0.5 * float(data.load.min()) if one_load else 1.5 * float(data.load.max())
+    at, several = f"at {load:.0f} N", "slip angles of 1 to 6 deg"
     out = [
+        Candidate(f"slip angles up to {far:.0f} deg {at}", side, _runs(large, load, pressure)),
+        Candidate(f"{several}, either sign, {at}", side, _runs(small, load, pressure)),
+        Candidate(f"{several} at another load, {other:.0f} N", side, _runs(small, other, pressure)),
         Candidate(
-            f"slip angles up to {far:.0f} deg at {load:.0f} N",
-            side,
-            _runs(study, np.deg2rad(angles), load, pressure),
-        ),
-        Candidate(
-            f"slip angles of 1 to 6 deg, either sign, at {load:.0f} N",
-            side,
-            _runs(study, np.deg2rad(small), load, pressure),
-        ),
-        Candidate(
-            f"slip angles of 1 to 6 deg at another load, {other:.0f} N",
-            side,
-            _runs(study, np.deg2rad(small), other, pressure),
-        ),
-        Candidate(
-            f"slip ratios of 0.01 to 0.15, drive and brake, at {load:.0f} N",
-            along,
-            _runs(study, ratios, load, pressure, along=True),
+            f"slip ratios of 0.01 to 0.15, drive and brake, {at}",
+            ("Fx",),
+            _runs(ratios, load, pressure, along=True),
         ),
     ]
     if np.isfinite(pressure):
-        out.append(
-            Candidate(
-                f"slip angles of 1 to 6 deg at {1.3e-5 * pressure:.2g} bar",
-                side,
-                _runs(study, np.deg2rad(small), load, 1.3 * pressure),
-            )
-        )
+        words = f"{several} at {1.3e-5 * pressure:.2g} bar"
+        out.append(Candidate(words, side, _runs(small, load, 1.3 * pressure)))
     if "Mz" not in fit.rmse and np.ptp(data.slip_angle) > 0.0:
-        step = max(1, len(data) // 200)
-        out.append(
-            Candidate(
-                "Mz recorded in the same runs", ("Mz",), data.take(np.arange(0, len(data), step))
-            )
-        )
+        some = data.take(np.arange(0, len(data), max(1, len(data) // 200)))
+        out.append(Candidate("Mz recorded in the same runs", ("Mz",), some))
     return tuple(out)
 
 
@@ -171,7 +145,7 @@ def _information(
     problem: BrushProblem,
     z: FloatArray,
     force: str,
-    parts: Sequence[ForceData],
+    parts: Sequence[ForceData | CellConditions],
     known: ForceMisfit | None,
 ) -> FloatArray:
     """Return J^T K^-1 J of one force at points, with scatter and smooth misfit in K."""
@@ -189,14 +163,7 @@ def _information(
     else:
         shape, variance = known.shape, min(known.variance, _MOST_VARIANCE)
     brush = point_parameters(_values(study), joined, study.fit.reference, here.half)
-    at = CellConditions(
-        joined.load,
-        np.nan_to_num(joined.pressure, nan=1.0),
-        joined.slip_angle,
-        joined.slip_ratio,
-        joined.camber,
-        *sliding_slips(brush, joined.load),
-    )
+    at = CellConditions.of(brush, joined)
     scatter = (at.load / study.misfit.load) ** 2
     smooth = kernel(force, shape, at, study.misfit.load)
     K = shape.share * smooth + np.diag((1.0 - shape.share) * scatter)
@@ -205,41 +172,33 @@ def _information(
     return np.asarray(slope.T @ solved / max(variance, 1e-12))
 
 
-def _joined(parts: Sequence[ForceData]) -> ForceData:
-    load, pressure, angle, ratio, camber = (
-        np.concatenate([getattr(part, name) for part in parts])
-        for name in ("load", "pressure", "slip_angle", "slip_ratio", "camber")
+def _joined(parts: Sequence[ForceData | CellConditions]) -> ForceData:
+    """Return steady points with forces of one: only the slopes at them matter."""
+    return _steady(
+        *(
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("load", "pressure", "slip_angle", "slip_ratio", "camber")
+        )
     )
-    return _steady(load, pressure, angle, ratio, camber)
 
 
 def _steady(
     load: FloatArray, pressure: FloatArray, angle: FloatArray, ratio: FloatArray, camber: FloatArray
 ) -> ForceData:
-    """Return steady points with forces of one: only the slopes at them matter."""
-    one = np.ones(load.size)
-    unknown = np.full(load.size, np.nan)
-    block = np.arange(load.size)
+    one, unknown, block = np.ones(load.size), np.full(load.size, np.nan), np.arange(load.size)
     return ForceData(load, pressure, angle, ratio, camber, unknown, one, one, one, block)
-
-
-def _points(at: CellConditions) -> ForceData:
-    return _steady(at.load, at.pressure, at.slip_angle, at.slip_ratio, at.camber)
 
 
 def _scale(study: Study, force: str) -> float:
     """Return the scale of a force; of one that was not recorded that of its like."""
-    fit = study.fit
-    scale = dict(zip(study.problem.forces, np.asarray(study.problem.scale).tolist(), strict=True))
-    if force in scale:
-        return float(scale[force])
+    fit, known = study.fit, study.scale_of(force)
+    if known is not None:
+        return known
     size = fit.values["friction"] * fit.reference.load
     return _SHARE * size * (_value(study, "half_length") if force == "Mz" else 1.0)
 
 
-def _runs(
-    study: Study, slips: FloatArray, load: float, pressure: float, *, along: bool = False
-) -> ForceData:
+def _runs(slips: FloatArray, load: float, pressure: float, *, along: bool = False) -> ForceData:
     """Return steady runs over one of the slips."""
     one, zero = np.ones(slips.size), np.zeros(slips.size)
     angle, ratio = (zero, slips) if along else (slips, zero)

@@ -1,12 +1,13 @@
 """Points of equal conditions as one: what a study of the brush's misfit is computed on."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.inference.identify.brush_law import point_parameters
-from tirelib.inference.identify.brush_problem import BrushProblem
+from tirelib.inference.identify.brush_problem import ROBUST, BrushProblem
 from tirelib.inference.identify.error_bands import levels
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.physics.brush.predict import PointParameters
@@ -38,6 +39,23 @@ class CellConditions:
     slide_angle: FloatArray
     slide_ratio: FloatArray
 
+    @classmethod
+    def of(cls, brush: PointParameters, data: ForceData) -> "CellConditions":
+        """Return the conditions of a brush at points."""
+        pressure = np.nan_to_num(data.pressure, nan=1.0)
+        return cls(
+            data.load,
+            pressure,
+            data.slip_angle,
+            data.slip_ratio,
+            data.camber,
+            *sliding_slips(brush, data.load),
+        )
+
+    def mapped(self, change: Callable[[FloatArray], FloatArray]) -> "CellConditions":
+        """Return the conditions with each array changed alike."""
+        return CellConditions(*(change(getattr(self, name)) for name in self.__slots__))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cells:
@@ -45,7 +63,6 @@ class Cells:
 
     Attributes
     ----------
-    force : str
     at : CellConditions
         Means over the cells.
     misfit : shape (m,)
@@ -55,8 +72,6 @@ class Cells:
         zero slip.
     slope : shape (m, p)
         Slope of the prediction by z.
-    weight : shape (m,)
-        Sum of the points' weights.
     """
 
     force: str
@@ -64,56 +79,38 @@ class Cells:
     misfit: FloatArray
     smooth: FloatArray
     slope: FloatArray
-    weight: FloatArray
 
 
-def cells_of(problem: BrushProblem, z: FloatArray, robust: float | None) -> tuple[Cells, ...]:
-    """Return the cells of each force of a solved problem."""
+def cells_of(problem: BrushProblem, z: FloatArray) -> tuple[Cells, ...]:
+    """Return the cells of each force of a solved problem; outliers count little."""
     data = problem.data
     residual = problem.residual(z)
     slope = problem.jacobian(z).reshape(*residual.shape, z.size)
     number = cell_numbers(data)
-    values = {name: value for name, (value, _) in problem.fixed.items()}
-    values |= dict(zip(problem.names, problem.values_of(z).tolist(), strict=True))
-    brush = point_parameters(values, data, problem.reference, problem.half)
-    angle, ratio = sliding_slips(brush, data.load)
-    scale = np.asarray(problem.scale)
+    brush = point_parameters(problem.at(z), data, problem.reference, problem.half)
+    at, scale = CellConditions.of(brush, data), np.asarray(problem.scale)
     out = []
     for k, name in enumerate(problem.forces):
-        known = np.isfinite(getattr(data, name))
-        weight = known.astype(np.float64)
-        if robust is not None:
-            weight = weight * robust / np.maximum(np.abs(residual[k]), robust)
-        mean = _Mean(number, weight)
-        at = CellConditions(
-            mean(data.load),
-            mean(np.nan_to_num(data.pressure, nan=1.0)),
-            mean(data.slip_angle),
-            mean(data.slip_ratio),
-            mean(data.camber),
-            mean(angle),
-            mean(ratio),
+        weight = np.isfinite(getattr(data, name)) * (
+            ROBUST / np.maximum(np.abs(residual[k]), ROBUST)
         )
-        columns = [mean(slope[k, :, j]) for j in range(z.size)]
+        mean = _mean_over(number, weight)
         misfit = -mean(residual[k])
         bend = mean(_bend(name, brush, data)) / float(scale[k])
-        out.append(Cells(name, at, misfit, misfit + bend, np.stack(columns, axis=1), mean.total))
+        columns = np.stack([mean(slope[k, :, j]) for j in range(z.size)], axis=1)
+        out.append(Cells(name, at.mapped(mean), misfit, misfit + bend, columns))
     return tuple(out)
 
 
-class _Mean:
-    """Weighted mean over the cells that have any weight."""
+def _mean_over(number: IntArray, weight: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """Return the weighted mean over the cells that have any weight."""
+    total = np.bincount(number, weight)
+    used = total > 0.0
 
-    def __init__(self, number: IntArray, weight: FloatArray) -> None:
-        self.number, self.weight = number, weight
-        every = np.asarray(np.bincount(number, weight), dtype=np.float64)
-        self.used = every > 0.0
-        self.total: FloatArray = every[self.used]
+    def mean(values: FloatArray) -> FloatArray:
+        return np.asarray(np.bincount(number, weight * values)[used] / total[used])
 
-    def __call__(self, values: FloatArray) -> FloatArray:
-        """Return the mean of values by cell."""
-        summed = np.bincount(self.number, self.weight * values)[self.used]
-        return np.asarray(summed / self.total, dtype=np.float64)
+    return mean
 
 
 def sliding_slips(brush: PointParameters, load: FloatArray) -> tuple[FloatArray, FloatArray]:

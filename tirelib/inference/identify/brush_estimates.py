@@ -9,9 +9,13 @@ import numpy as np
 from tirelib.core.arrays import FloatArray
 from tirelib.inference.identify.brush_law import SPECS
 from tirelib.inference.identify.brush_misfit import Term
-from tirelib.inference.identify.brush_properties import property_terms, slope_terms
-from tirelib.inference.identify.brush_study import Study, stiffness_at
-from tirelib.inference.identify.error_bands import levels
+from tirelib.inference.identify.brush_study import (
+    Study,
+    property_terms,
+    slope_terms,
+    stiffness_at,
+)
+from tirelib.inference.identify.error_bands import cells_of_load
 from tirelib.inference.identify.estimate import Estimate
 
 WIDEST = 0.25
@@ -40,8 +44,6 @@ class SlipStiffness:
     ----------
     slip : str
         slip_angle [N/rad] or slip_ratio [N].
-    load, pressure : float
-    value, std, low, high : float
     """
 
     slip: str
@@ -56,11 +58,7 @@ class SlipStiffness:
 def estimates_of(study: Study, *, free_radius: float | None = None) -> tuple[Estimate, ...]:
     """Return the fitted numbers with intervals and flags.
 
-    Parameters
-    ----------
-    study : Study
-    free_radius : float, [m], optional
-        Radius of the tire; a half length beyond 0.6 of it is no contact length.
+    A half length beyond 0.6 of the tire's free radius [m] is no contact length.
     """
     names, fit = study.fit.names, study.fit
     errors = _errors(study, np.eye(len(names)), [property_terms(study, name) for name in names])
@@ -130,14 +128,9 @@ def _errors(
 def slip_stiffness(study: Study) -> tuple[SlipStiffness, ...]:
     """Return cornering and longitudinal stiffness at each load and pressure of the data."""
     data, fit = study.problem.data, study.fit
-    slips = [
-        s
-        for s, names in (("slip_angle", ("Fy", "Mz")), ("slip_ratio", ("Fx",)))
-        if set(names) & set(fit.rmse)
-    ]
-    pair = np.stack([levels(data.load), levels(data.pressure)])
-    _, number = np.unique(pair, axis=1, return_inverse=True)
-    number = np.asarray(number).ravel()
+    shown_by = {"slip_angle": {"Fy", "Mz"}, "slip_ratio": {"Fx"}}
+    slips = [slip for slip, names in shown_by.items() if names & set(fit.rmse)]
+    number = cells_of_load(data)
     count = np.bincount(number)
     load = np.bincount(number, data.load) / count
     pressure = np.bincount(number, data.pressure) / count
@@ -158,18 +151,15 @@ def slip_stiffness(study: Study) -> tuple[SlipStiffness, ...]:
             for slip, i in keys
         ],
     )
-    out = []
-    for (slip, i), error in zip(keys, errors, strict=True):
-        size = float(value[slip][i])
-        out.append(
-            SlipStiffness(
-                slip,
-                float(load[i]),
-                float(pressure[i]),
-                size,
-                size * error.std,
-                size * float(np.exp(error.low)),
-                size * float(np.exp(error.high)),
-            )
+    return tuple(
+        SlipStiffness(
+            slip,
+            float(load[i]),
+            float(pressure[i]),
+            size := float(value[slip][i]),
+            size * error.std,
+            size * float(np.exp(error.low)),
+            size * float(np.exp(error.high)),
         )
-    return tuple(out)
+        for (slip, i), error in zip(keys, errors, strict=True)
+    )

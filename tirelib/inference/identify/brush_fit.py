@@ -11,29 +11,24 @@ measured value.
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import Tire
-from tirelib.inference.identify.brush_law import (
-    NEUTRAL,
-    SPECS,
-    Reference,
-    point_parameters,
-    predict,
-)
-from tirelib.inference.identify.brush_problem import ASSUMED_HALF_LENGTH, BrushProblem
+from tirelib.inference.identify.brush_law import NEUTRAL, SPECS, BrushModel, Reference
+from tirelib.inference.identify.brush_problem import ASSUMED_HALF_LENGTH, ROBUST, BrushProblem
 from tirelib.inference.identify.error_bands import BandError, band_errors
 from tirelib.inference.identify.force_checks import refuse_wrong_forces, slips_vary
 from tirelib.inference.identify.force_data import FORCES, ForceData
 from tirelib.inference.identify.ring_patch import ring_half
-from tirelib.physics.brush.predict import PointForces, PointParameters
 
 LOAD_RATIO = 1.1
 """Least ratio of loads that tells anything of the law."""
+LIMIT = 0.5
+"""Uncertainty up to which a parameter counts as identified, relative to its size."""
 _START_POINTS = 4000
 
 
@@ -60,7 +55,6 @@ class BrushFit:
         Root mean square error, share of variance explained, largest measured size.
     errors : tuple of BandError
         By force: all points, then bands of load, pressure and slip angle.
-    points : int
     """
 
     names: tuple[str, ...]
@@ -83,13 +77,10 @@ class BrushFit:
         fitted = dict(zip(self.names, self.value.tolist(), strict=True))
         return {**{name: value for name, (value, _) in self.held.items()}, **fitted}
 
-    def parameters(self, data: ForceData) -> PointParameters:
-        """Return the brush at the points of other data."""
-        return point_parameters(self.values, data, self.reference, ring_half(self.tire, data))
-
-    def predict(self, data: ForceData) -> PointForces:
-        """Return the forces at the points of other data."""
-        return predict(self.values, data, self.reference, ring_half(self.tire, data))
+    @property
+    def brush(self) -> BrushModel:
+        """The brush with these parameters."""
+        return BrushModel("fitted", self.values, self.reference, self.tire)
 
 
 def fit_brush(
@@ -99,14 +90,12 @@ def fit_brush(
     free: Collection[str] = (),
     held: Mapping[str, float] | None = None,
     tire: Tire | None = None,
-    robust: float | None = 3.0,
-    limit: float = 0.5,
+    robust: float | None = ROBUST,
 ) -> BrushFit:
     """Fit the brush to measured forces.
 
     Parameters
     ----------
-    data : ForceData
     forces : sequence of str, optional
         Of Fy, Fx, Mz; by default those that are measured and to which the slips matter.
     free : collection of str
@@ -119,8 +108,6 @@ def fit_brush(
     robust : float or None
         Misfit, in robust standard deviations, from which a point counts less (Huber); None is plain
         least squares.
-    limit : float
-        Uncertainty up to which a parameter counts as identified, relative to its size.
 
     Raises
     ------
@@ -138,29 +125,19 @@ def fit_brush(
     reference = Reference(float(np.median(data.load)), float(np.median(data.pressure)))
     problem = BrushProblem(data, wanted, names, fixed, reference, ring_half(tire, data))
     z = problem.start()
-    few = len(data) > _START_POINTS
-    if few:
+    if len(data) > _START_POINTS:
         z = problem.take(np.arange(0, len(data), len(data) // _START_POINTS)).solve(z, None)
-    scale = problem.scale
     for loss in (None,) if robust is None and len(wanted) == 1 else (None, robust, robust):
         z = problem.solve(z, loss)
-        scale = problem.misfit(z)
-        problem = problem.weighed(scale)
+        problem = replace(problem, scale=problem.misfit(z))
     covariance_z = problem.covariance(z, robust)
     value, slope = problem.values_of(z), problem.slope_of(z)
     deviation = np.sqrt(np.diag(covariance_z))
     with np.errstate(invalid="ignore"):
         covariance = covariance_z * np.outer(slope, slope)
+    assumed = not tire and fixed.get("half_length", (0.0, ""))[1].startswith("assumed")
     status = tuple(
-        _status(
-            name,
-            at,
-            spread,
-            limit,
-            assumed="half_length" in fixed
-            and not tire
-            and fixed["half_length"][1].startswith("assumed"),
-        )
+        _status(name, at, spread, assumed=assumed)
         for name, at, spread in zip(names, value, deviation, strict=True)
     )
     found = problem.predicted(z)
@@ -269,7 +246,7 @@ def _choose(
     return tuple(names), held
 
 
-def _status(name: str, value: float, spread: float, limit: float, *, assumed: bool) -> str:
+def _status(name: str, value: float, spread: float, *, assumed: bool) -> str:
     spec = SPECS[name]
     room = 1e-3 * (np.log(spec.high / spec.low) if spec.log else spec.high - spec.low)
     low, high = (
@@ -280,6 +257,6 @@ def _status(name: str, value: float, spread: float, limit: float, *, assumed: bo
     if min(low, high) < room:
         return "at boundary"
     stiffness = name in ("lateral_stiffness", "longitudinal_stiffness")
-    if not spread <= limit or (assumed and stiffness):
+    if not spread <= LIMIT or (assumed and stiffness):
         return "not identifiable from this campaign"
     return "ok"

@@ -16,6 +16,7 @@ not, so the misfit is also taken about a curve without that bend, and the likeli
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -40,17 +41,14 @@ FREE = 5.0
 """Standard deviation of every z before any measurement: vague, and enough to stay finite."""
 
 
-@dataclass(frozen=True, slots=True)
-class Term:
-    """A multiple of the misfit of one force at one place, forces over their scale."""
+class Term(NamedTuple):
+    """A multiple of the misfit of one force at one place, forces over their scale.
+
+    The place is a tuple in the order of `CellConditions`.
+    """
 
     force: str
-    load: float
-    pressure: float
-    slip_angle: float
-    slip_ratio: float
-    slide_angle: float
-    slide_ratio: float
+    place: tuple[float, ...]
     factor: float
 
 
@@ -60,7 +58,6 @@ class Shape:
 
     Attributes
     ----------
-    slip, load : float
     share : float
         Smooth part of the variance.
     """
@@ -76,13 +73,11 @@ class ForceMisfit:
 
     Attributes
     ----------
-    cells : Cells
     shape : Shape
         The likeliest.
     variance : float
         Variance of the misfit at the reference load, over the force's scale squared; infinite where
         too few points tell it.
-    freedom : int
     evidence : float
         Logarithm of the restricted likelihood, over all shapes.
     """
@@ -100,7 +95,6 @@ class Misfit:
 
     Attributes
     ----------
-    forces : tuple of ForceMisfit
     load, pressure : float, [N], [Pa]
         Reference.
     """
@@ -179,16 +173,10 @@ class Misfit:
 def misfit_of(
     cells: Sequence[Cells], load: float, pressure: float, *, smooth: bool = False
 ) -> Misfit:
-    """Return the misfit that the residuals of a fit tell.
+    """Return the misfit that the residuals of a fit tell, with cells of each force.
 
-    Parameters
-    ----------
-    cells : sequence of Cells
-        One per force.
-    load, pressure : float, [N], [Pa]
-        Reference.
-    smooth : bool
-        Taken from the curve without a bend at zero slip instead of from the brush.
+    Load and pressure are the reference, [N], [Pa]. With `smooth` it is taken from the curve without
+    a bend at zero slip instead of from the brush.
     """
     if smooth:
         cells = [replace(each, misfit=each.smooth) for each in cells]
@@ -231,7 +219,7 @@ def _told(cells: Cells, load: float) -> ForceMisfit:
     take = np.arange(cells.misfit.size)
     if take.size > _MOST_FOR_LENGTHS:
         take = np.random.default_rng(0).permutation(take)[:_MOST_FOR_LENGTHS]
-    at = CellConditions(*(getattr(cells.at, name)[take] for name in CellConditions.__slots__))
+    at = cells.at.mapped(lambda values: values[take])
     left, size, _ = np.linalg.svd(cells.slope[take], full_matrices=True)
     rank = int((size > 1e-7 * size[0]).sum()) if size.size else 0
     rest = left[:, rank:].T
@@ -255,9 +243,10 @@ def _told(cells: Cells, load: float) -> ForceMisfit:
 
 
 def _joined(at: CellConditions, terms: Sequence[Term]) -> CellConditions:
-    names = ("load", "pressure", "slip_angle", "slip_ratio", "slide_angle", "slide_ratio")
-    parts = {name: np.array([getattr(t, name) for t in terms]) for name in names}
-    parts["camber"] = np.zeros(len(terms))
-    return CellConditions(
-        *(np.concatenate([getattr(at, name), parts[name]]) for name in CellConditions.__slots__)
+    more = (
+        np.array([term.place for term in terms])
+        .reshape(len(terms), len(CellConditions.__slots__))
+        .T
     )
+    pairs = zip(CellConditions.__slots__, more, strict=True)
+    return CellConditions(*(np.concatenate([getattr(at, name), column]) for name, column in pairs))

@@ -1,13 +1,13 @@
 """The least squares of `tirelib.inference.identify.brush_fit`: residuals, slopes, covariance."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from tirelib.core.arrays import FloatArray, IntArray
-from tirelib.inference.identify.brush_law import SPECS, Reference, predict
+from tirelib.inference.identify.brush_law import SPECS, Reference, Spec, predict
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.physics.brush.predict import PointForces
 
@@ -15,6 +15,8 @@ ASSUMED_HALF_LENGTH = 0.06
 """Where nothing tells it, [m]; c_py is then not identifiable, c_py a^2 is."""
 MOMENT_SCALE = 10.0
 """By which Mz counts less than its misfit says, beside Fx or Fy."""
+ROBUST = 3.0
+"""Misfit, in robust standard deviations, from which a point counts less (Huber)."""
 _STEP = 1e-6
 _RANK = 1e-9
 _QUANTILE, _NORMAL_QUANTILE = 0.9, 1.6449
@@ -34,30 +36,22 @@ class BrushProblem:
     scale: FloatArray | None = None  # of each force
 
     def take(self, index: IntArray) -> "BrushProblem":
-        """Return the problem of some points, with its first scale."""
+        """Return the problem of some points."""
         half = None if self.half is None else self.half[index]
-        return BrushProblem(
-            self.data.take(index), self.forces, self.names, self.fixed, self.reference, half
-        )
-
-    def weighed(self, scale: FloatArray) -> "BrushProblem":
-        """Return the problem with another scale of each force."""
-        return BrushProblem(
-            self.data, self.forces, self.names, self.fixed, self.reference, self.half, scale
-        )
+        return replace(self, data=self.data.take(index), half=half)
 
     def start(self) -> FloatArray:
         """Return a start: C from the steepest quarter of Fy over slip, mu from the largest."""
         d = self.data
         a = self.fixed.get("half_length", (ASSUMED_HALF_LENGTH, ""))[0]
         size = a if self.half is None else float(np.median(self.half))
-        used = [np.hypot(*(np.nan_to_num(getattr(d, n)) for n in ("Fx", "Fy"))) / d.load]
-        friction = float(np.clip(np.quantile(used[0], 0.995), 0.2, 2.0)) * 1.05
+        used = np.hypot(np.nan_to_num(d.Fx), np.nan_to_num(d.Fy)) / d.load
+        friction = float(np.clip(np.quantile(used, 0.995), 0.2, 2.0)) * 1.05
         slip = np.hypot(np.tan(d.slip_angle), d.slip_ratio / np.maximum(1.0 + d.slip_ratio, 0.1))
         small = (slip > 0.003) & (slip < 0.05)
         if not small.any():
             small = slip > 0.0
-        stiffness = float(np.median(used[0][small] * d.load[small] / slip[small]))
+        stiffness = float(np.median(used[small] * d.load[small] / slip[small]))
         c = max(1.3 * stiffness, 100.0) / (2.0 * size**2)
         start = {
             "lateral_stiffness": c,
@@ -71,11 +65,14 @@ class BrushProblem:
         low, high = self._bounds()
         return np.clip(self.z_of(value), low + 1e-6, high - 1e-6)
 
+    def at(self, z: FloatArray) -> dict[str, float]:
+        """Return every parameter by name, SI."""
+        values = {name: value for name, (value, _) in self.fixed.items()}
+        return values | dict(zip(self.names, self.values_of(z).tolist(), strict=True))
+
     def predicted(self, z: FloatArray) -> PointForces:
         """Return the forces at z."""
-        values = {name: value for name, (value, _) in self.fixed.items()}
-        values |= dict(zip(self.names, self.values_of(z).tolist(), strict=True))
-        return predict(values, self.data, self.reference, self.half)
+        return predict(self.at(z), self.data, self.reference, self.half)
 
     def residual(self, z: FloatArray) -> FloatArray:
         """Return misfit over scale, one row per force, zero where not measured."""
@@ -119,9 +116,7 @@ class BrushProblem:
         """Return the scale of each force: the size of its misfit, a tenth of outliers aside.
 
         The median would not do: forces that are zero at half of the points (Fy of straight braking)
-        fit there whatever the brush, and their small misfit would outweigh all others. Fx and Fy
-        share one scale; Mz beside them counts little: enough for the contact length, which they do
-        not hold, and too little for the brush's coarse moment to bend their stiffness and friction.
+        fit there whatever the brush, and their small misfit would outweigh all others.
         """
         found = self.predicted(z)
         floor = 1e-6 * self._start_scale()
@@ -161,28 +156,27 @@ class BrushProblem:
 
     def values_of(self, z: FloatArray) -> FloatArray:
         """Return the parameters in SI."""
-        return np.array([_value(name, at) for name, at in zip(self.names, z, strict=True)])
+        pairs = zip(self._specs, z, strict=True)
+        return np.array([float(np.exp(at)) if s.log else float(at * s.size) for s, at in pairs])
 
     def slope_of(self, z: FloatArray) -> FloatArray:
         """Return their derivative by z."""
-        value = self.values_of(z)
-        spec = [SPECS[name] for name in self.names]
-        return np.array([v if s.log else s.size for s, v in zip(spec, value, strict=True)])
+        pairs = zip(self._specs, self.values_of(z), strict=True)
+        return np.array([v if s.log else s.size for s, v in pairs])
 
     def z_of(self, value: FloatArray) -> FloatArray:
         """Return z of parameters in SI."""
-        spec = [SPECS[name] for name in self.names]
-        pairs = zip(spec, value, strict=True)
+        pairs = zip(self._specs, value, strict=True)
         return np.array([np.log(v) if s.log else v / s.size for s, v in pairs])
 
+    @property
+    def _specs(self) -> list[Spec]:
+        return [SPECS[name] for name in self.names]
+
     def _bounds(self) -> tuple[FloatArray, FloatArray]:
-        low = self.z_of(np.array([SPECS[name].low for name in self.names]))
-        return low, self.z_of(np.array([SPECS[name].high for name in self.names]))
+        low, high = np.array([(spec.low, spec.high) for spec in self._specs]).T
+        return self.z_of(low), self.z_of(high)
 
     def _start_scale(self) -> FloatArray:
         rms = [np.sqrt(np.nanmean(getattr(self.data, name) ** 2)) for name in self.forces]
         return np.asarray(0.05 * np.maximum(np.array(rms), 1e-3), dtype=np.float64)
-
-
-def _value(name: str, z: float) -> float:
-    return float(np.exp(z)) if SPECS[name].log else float(z * SPECS[name].size)

@@ -1,7 +1,10 @@
-"""A solved brush fit with the misfit that its residuals tell."""
+"""A solved brush fit with the misfit that its residuals tell, and what the tire has beyond it.
+
+That is its own slope at zero slip, largest force and trail.
+"""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import stdtrit
@@ -9,12 +12,13 @@ from scipy.special import stdtrit
 from tirelib.core.arrays import FloatArray
 from tirelib.inference.identify.brush_cells import cells_of, slip_stiffnesses
 from tirelib.inference.identify.brush_fit import BrushFit
-from tirelib.inference.identify.brush_misfit import Misfit, misfit_of
-from tirelib.inference.identify.brush_problem import BrushProblem
+from tirelib.inference.identify.brush_misfit import Misfit, Term, misfit_of
+from tirelib.inference.identify.brush_problem import ROBUST, BrushProblem
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.identify.ring_patch import ring_half
 
-ROBUST = 3.0
+NEAR_ZERO = 0.01
+"""Slip, in units of full sliding, between whose signs the slope at zero is taken."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +46,13 @@ class Study:
             "slip_ratio": size / self.stiffness["slip_ratio"],
         }
 
+    def scale_of(self, force: str) -> float | None:
+        """Return the scale of a force; None if it was not fitted."""
+        forces, scale = self.problem.forces, self.problem.scale
+        if force not in forces or scale is None:
+            return None
+        return float(scale[forces.index(force)])
+
     @property
     def quantile(self) -> float:
         """Student's factor of a 95 % interval."""
@@ -53,10 +64,10 @@ def study_of(fit: BrushFit, data: ForceData) -> Study:
     half = ring_half(fit.tire, data)
     problem = BrushProblem(data, tuple(fit.rmse), fit.names, fit.held, fit.reference, half)
     z = problem.z_of(fit.value)
-    problem = problem.weighed(problem.misfit(z))
+    problem = replace(problem, scale=problem.misfit(z))
     stiffness = stiffness_at(fit, np.array([fit.reference.load]))
     at_zero = {name: float(value[0]) for name, value in stiffness.items()}
-    cells = cells_of(problem, z, ROBUST)
+    cells = cells_of(problem, z)
     pressure = known_pressure(fit.reference.pressure)
     misfits = tuple(
         misfit_of(cells, fit.reference.load, pressure, smooth=smooth) for smooth in (False, True)
@@ -71,10 +82,90 @@ def stiffness_at(
     zero, none = np.zeros_like(load), np.full_like(load, np.nan)
     where = np.full_like(load, fit.reference.pressure) if pressure is None else pressure
     data = ForceData(load, where, zero, zero, zero, none, none, none, none, zero.astype(np.int64))
-    across, along = slip_stiffnesses(fit.parameters(data))
+    across, along = slip_stiffnesses(fit.brush.parameters(data))
     return {"slip_angle": across, "slip_ratio": along}
 
 
 def known_pressure(value: float) -> float:
     """Return the pressure, or one for all where none is known."""
     return value if np.isfinite(value) else 1.0
+
+
+def property_terms(study: Study, name: str) -> list[Term]:
+    """Return what the tire's own property has beyond the best brush, for the parameter's z."""
+    load, pressure = study.misfit.load, study.misfit.pressure
+    forces = set(study.fit.rmse)
+    fitted = set(study.fit.names)
+    side = "slip_angle" if "Fy" in forces else "slip_ratio"
+
+    def slope(slip: str, factor: float) -> list[Term]:
+        return slope_terms(study, slip, factor, load, pressure, study.stiffness[slip])
+
+    def length(factor: float) -> list[Term]:
+        """Return ln a = ln 3 + ln (slope of Mz) - ln C."""
+        return [*_trail_terms(study, factor), *slope("slip_angle", -factor)]
+
+    has_length = "half_length" in fitted and {"Fy", "Mz"} <= forces
+    if name == "friction":
+        return _peak_terms(study, side)
+    if name == "half_length" and has_length:
+        return length(1.0)
+    if name in ("lateral_stiffness", "longitudinal_stiffness"):
+        along = name == "longitudinal_stiffness" or side == "slip_ratio"
+        own = slope("slip_ratio" if along else "slip_angle", 1.0)
+        return own + (length(-2.0) if has_length else [])
+    return []
+
+
+def slope_terms(
+    study: Study, slip: str, factor: float, load: float, pressure: float, size: float
+) -> list[Term]:
+    """Return factor times the change of ln C by the misfit's slope at zero slip."""
+    force = "Fy" if slip == "slip_angle" else "Fx"
+    scale = study.scale_of(force)
+    if scale is None:
+        return []
+    sign = -1.0 if force == "Fy" else 1.0
+    slide = 3.0 * study.fit.values["friction"] * load / size
+    h = NEAR_ZERO * slide
+    each = sign * factor * scale / (2.0 * h * size)
+    where = known_pressure(pressure)
+    return _pair(force, load, where, slip, slide, h, each)
+
+
+def _trail_terms(study: Study, factor: float) -> list[Term]:
+    """Return factor times the change of ln (slope of Mz at zero slip)."""
+    scale = study.scale_of("Mz")
+    if scale is None:
+        return []
+    size = study.stiffness["slip_angle"] * study.fit.values["half_length"] / 3.0
+    slide = study.slide["slip_angle"]
+    h = NEAR_ZERO * slide
+    load, pressure, each = study.misfit.load, study.misfit.pressure, factor * scale / (2 * h * size)
+    return _pair("Mz", load, pressure, "slip_angle", slide, h, each)
+
+
+def _peak_terms(study: Study, slip: str) -> list[Term]:
+    """Return the change of ln mu by the misfit where the whole contact slides."""
+    force = "Fy" if slip == "slip_angle" else "Fx"
+    scale = study.scale_of(force)
+    if scale is None:
+        return []
+    sign = -1.0 if force == "Fy" else 1.0
+    load, pressure = study.misfit.load, study.misfit.pressure
+    each = 0.5 * sign * scale / (study.fit.values["friction"] * load)
+    far = study.slide[slip]
+    return _pair(force, load, pressure, slip, far, far, each)
+
+
+def _pair(
+    force: str, load: float, pressure: float, slip: str, slide: float, at: float, factor: float
+) -> list[Term]:
+    """Return the difference of the misfit at a slip and at its opposite, times a factor."""
+
+    def place(at: float) -> tuple[float, ...]:
+        if slip == "slip_angle":
+            return load, pressure, at, 0.0, 0.0, slide, 1.0
+        return load, pressure, 0.0, at, 0.0, 1.0, slide
+
+    return [Term(force, place(s * at), s * factor) for s in (1.0, -1.0)]

@@ -69,11 +69,8 @@ class Data:
     Attributes
     ----------
     strain : shape (n_runs, n_phi), [-]
-    points : Operating
     angle_std : shape (n_runs,), [rad]
-    tolerance : Tolerance
     noise : float, [-]
-    low_pass : LowPass
     deflection : shape (n_runs,), [m]
         Free radius less measured loaded radius; NaN where not measured.
     deflection_std : float, [m]
@@ -117,7 +114,6 @@ class StraightRuns:
         Mean over the gages in use: the ring is as wide as the belt, and so is this mean.
     gages : tuple of int
         Indices of the gages in use.
-    noise : RepeatNoise
     deflection : shape (n_runs,), [m]
         Free radius less measured loaded radius; NaN where not measured.
     """

@@ -56,7 +56,6 @@ class Discrepancy:
         ----------
         waveform : shape (n_runs, n_phi)
         half_angle : shape (n_runs,), [rad]
-        points : Operating
         phi : shape (n_phi,), [rad]
 
         Returns

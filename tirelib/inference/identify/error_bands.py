@@ -86,6 +86,13 @@ def levels(values: FloatArray) -> IntArray:
     return number
 
 
+def cells_of_load(data: ForceData) -> IntArray:
+    """Return the number of each point's load and pressure, from 0."""
+    pair = np.stack([levels(data.load), levels(data.pressure)])
+    number = np.unique(pair, axis=1, return_inverse=True)[1]
+    return np.asarray(number, dtype=np.int64).ravel()
+
+
 def band_errors(force: str, data: ForceData, error: FloatArray) -> tuple[BandError, ...]:
     """Return the error of a force by band; points without a measurement are NaN in `error`."""
     out = []

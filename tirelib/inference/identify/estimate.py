@@ -1,10 +1,6 @@
-"""An identified number of ring or brush with its interval, and as files and JSON hold it."""
+"""An identified number of ring or brush with its interval."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
-
-from tirelib.core.parameters import NUMBERS
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,29 +41,3 @@ class Estimate:
             "flags": list(self.flags),
         }
         return notes | ({"helps": self.helps} if self.helps else {})
-
-    def entry(self, stored: str, edge: Callable[[float], float], scale: float) -> dict[str, Any]:
-        """Return the number as JSON holds it, in the unit of a tire file.
-
-        Parameters
-        ----------
-        stored : str
-            Its name in a file.
-        edge : callable
-            From the number's SI value to that of the file in its unit.
-        scale : float
-            From its deviation to that in the file's unit.
-        """
-        low, high = sorted((edge(self.low), edge(self.high)))
-        return {
-            "name": stored,
-            "meaning": NUMBERS[stored].meaning,
-            "value": edge(self.value),
-            "std": scale * self.std,
-            "low": low,
-            "high": high,
-            "fit_std": scale * self.fit_std,
-            "unit": NUMBERS[stored].unit,
-            "flags": list(self.flags),
-            "helps": self.helps,
-        }

@@ -9,8 +9,7 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import CalibrationError
 from tirelib.core.parameters import Tire
 from tirelib.effects.brush_state import BrushConditions, BrushState
-from tirelib.inference.identify.brush_law import Reference, point_parameters
-from tirelib.inference.identify.brush_model import BrushModel
+from tirelib.inference.identify.brush_law import BrushModel, Reference, point_parameters
 from tirelib.inference.identify.force_points import ForcePoints
 from tirelib.inference.identify.ring_patch import half_lengths, ring_contact
 from tirelib.model.brush import BrushChange, brush_forces, brush_state
@@ -28,8 +27,6 @@ class ForceBench:
 
     Attributes
     ----------
-    points : ForcePoints
-    conditions : BrushConditions
     law : Reference
         Law of the half length.
     half : shape (n,) or None

@@ -1,6 +1,5 @@
 """Forces and their conditions from campaigns: run means of steady runs, samples of sweeps."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -16,6 +15,8 @@ FREE_ROLLING = ("free", "corner", "camber")
 _MEASURED_AS = {"load": "Fz"}
 TEMPERATURES = ("tread_temperature", "temperature", "tire_temperature")
 """Channels that tell the tread's temperature; the first that was recorded counts."""
+BLOCK = 10.0
+"""Stretch of a sweep over which errors are taken to go together, [s]."""
 _UNKNOWN: FloatArray = np.empty(0)
 
 
@@ -79,14 +80,8 @@ class ForceData:
         return ForceData(*(getattr(self, f.name)[index] for f in fields(self)))
 
 
-def force_data(
-    campaigns: Campaign | Sequence[Campaign],
-    *,
-    every: int = 1,
-    block: float = 10.0,
-    travel_speed: bool = False,
-) -> ForceData:
-    """Read the forces of campaigns.
+def force_data(campaign: Campaign, *, every: int = 1, travel_speed: bool = False) -> ForceData:
+    """Read the forces of a campaign.
 
     Steady runs give one point each, the mean of their samples; a sweep gives its samples. Points
     without slip angle or with a load that is not positive are left out, a missing slip ratio or
@@ -94,11 +89,8 @@ def force_data(
 
     Parameters
     ----------
-    campaigns : Campaign or sequence of Campaign
     every : int
         Each `every`-th sample of a sweep is taken.
-    block : float, [s]
-        Stretch of a sweep over which errors are taken to go together.
     travel_speed : bool
         True if the recorded slip ratio is by the speed of travel, v, and not by v cos(alpha): a
         freely rolling wheel then reads cos(alpha) - 1. Runs of freely rolling kinds read zero
@@ -109,31 +101,25 @@ def force_data(
     CalibrationError
         If there is no point at all.
     """
-    many = [campaigns] if isinstance(campaigns, Campaign) else list(campaigns)
-    if every < 1 or not block > 0.0:
-        raise ParameterError(
-            f"force data: every = {every}, block = {block:g} s; allowed are every >= 1, block > 0"
-        )
+    if every < 1:
+        raise ParameterError(f"force data: every = {every}; allowed is every >= 1")
     parts: list[ForceData] = []
     count = 0
-    for campaign in many:
-        for run in campaign.runs():
-            part = _sweep(run, every, block) if run.plan.kind == "sweep" else _mean(run)
-            if part is None:
-                continue
-            if run.plan.kind in FREE_ROLLING:
-                part["slip_ratio"] = np.zeros_like(part["load"])
-            elif travel_speed:
-                part["slip_ratio"] = (1.0 + part["slip_ratio"]) / np.cos(part["slip_angle"]) - 1.0
-            part["block"] = part["block"] - part["block"].min() + count
-            count = int(part["block"].max()) + 1
-            block_number = part.pop("block").astype(np.int64)
-            parts.append(ForceData(**part, block=block_number))
+    for run in campaign.runs():
+        part = _sweep(run, every) if run.plan.kind == "sweep" else _mean(run)
+        if part is None:
+            continue
+        if run.plan.kind in FREE_ROLLING:
+            part["slip_ratio"] = np.zeros_like(part["load"])
+        elif travel_speed:
+            part["slip_ratio"] = (1.0 + part["slip_ratio"]) / np.cos(part["slip_angle"]) - 1.0
+        block = (part["block"] - part["block"].min() + count).astype(np.int64)
+        count = int(block.max()) + 1
+        parts.append(ForceData(**(part | {"block": block})))
     if not parts:
-        names = ", ".join(campaign.header.name for campaign in many)
         raise CalibrationError(
-            f"{names}: no run holds a slip angle with a vertical load; forces over slip are "
-            "needed; record Fz and slip_angle"
+            f"{campaign.header.name}: no run holds a slip angle with a vertical load; forces over "
+            "slip are needed; record Fz and slip_angle"
         )
     return ForceData(
         **{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(ForceData)}
@@ -151,7 +137,7 @@ def _mean(run: Run) -> dict[str, FloatArray] | None:
     return _usable(out, np.zeros(1))
 
 
-def _sweep(run: Run, every: int, block: float) -> dict[str, FloatArray] | None:
+def _sweep(run: Run, every: int) -> dict[str, FloatArray] | None:
     """Return the samples of a sweep, or None without load or slip angle."""
     if run.rig_time is None or run.rig_time.size == 0:
         return None
@@ -163,7 +149,7 @@ def _sweep(run: Run, every: int, block: float) -> dict[str, FloatArray] | None:
         out[name] = given[::every]
     out |= {name: value[::every] for name, value in _further(run, size).items()}
     out["time"] = (run.plan.start or 0.0) + run.rig_time[::every] - run.rig_time[0]
-    return _usable(out, np.floor((run.rig_time[::every] - run.rig_time[0]) / block))
+    return _usable(out, np.floor((run.rig_time[::every] - run.rig_time[0]) / BLOCK))
 
 
 def _further(run: Run, size: int) -> dict[str, FloatArray]:

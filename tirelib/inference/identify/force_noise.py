@@ -37,7 +37,6 @@ def force_noise(points: ForcePoints, force: FloatArray) -> tuple[float, int, int
 
     Parameters
     ----------
-    points : ForcePoints
     force : shape (n,), [N] or [N m]
         Measured, finite.
     """

@@ -69,7 +69,6 @@ def noise_note(name: str, noise: float, size: float) -> tuple[str, ...]:
 
     Parameters
     ----------
-    name : str
     noise, size : float, [N] or [N m]
         Standard deviation of a point from repeats (NaN without), and the rms of the force.
     """

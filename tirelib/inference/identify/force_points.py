@@ -36,7 +36,6 @@ class ForcePoints:
         Means over the points' samples.
     slip_rate : [rad/s]
         Rate of the slip angle; zero in steady runs.
-    samples : int
     cell : int
         Number of the cell of conditions.
     sweep : bool

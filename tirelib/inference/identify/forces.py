@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from math import isfinite, nan
 from types import MappingProxyType
 from typing import Any
 
@@ -17,18 +18,14 @@ from tirelib.core.threads import one_thread
 from tirelib.inference.identify.brush_advice import advice
 from tirelib.inference.identify.brush_estimates import SlipStiffness, estimates_of, slip_stiffness
 from tirelib.inference.identify.brush_fit import BrushFit, fit_brush
-from tirelib.inference.identify.brush_model import stored_number
+from tirelib.inference.identify.brush_law import stored_number
 from tirelib.inference.identify.brush_study import study_of
+from tirelib.inference.identify.error_bands import cells_of_load
 from tirelib.inference.identify.estimate import Estimate
 from tirelib.inference.identify.force_checks import ANGLE_SPAN
 from tirelib.inference.identify.force_data import ForceData, force_data
 from tirelib.inference.identify.force_notes import force_notes
-from tirelib.inference.identify.lateral_force import (
-    MOST_POINTS,
-    PressureComparison,
-    cells_of_load,
-    compare_pressures,
-)
+from tirelib.inference.identify.lateral_force import PressureComparison, compare_pressures
 
 MOST_SAMPLES = 50000
 """A longer sweep is thinned evenly: its samples are closer than its errors are independent."""
@@ -48,8 +45,6 @@ class ForceIdentification:
 
     Attributes
     ----------
-    fit : BrushFit
-    estimates : tuple of Estimate
     stiffness : tuple of SlipStiffness
         By load and pressure.
     comparison : PressureComparison or None
@@ -79,11 +74,8 @@ def identify_forces(
 
     Parameters
     ----------
-    campaign : Campaign
     ring : Tire, optional
         Gives the contact length; without it Mz does, or it is assumed and flagged.
-    progress : callable, optional
-        Called with a label at each step.
 
     Raises
     ------
@@ -92,7 +84,9 @@ def identify_forces(
     """
     tell = progress or (lambda label: None)
     tell("reading forces")
-    data, notes = _read(campaign)
+    read: list[Callable[[], Any]] = [partial(force_data, campaign), partial(force_notes, campaign)]
+    data, notes = forked(read)  # both read every run
+    notes = list(notes)
     if len(data) > MOST_SAMPLES:
         step = -(-len(data) // MOST_SAMPLES)
         notes.append(f"{len(data)} samples: each {step}. is used, {-(-len(data) // step)} in all")
@@ -141,13 +135,6 @@ def _fit(data: ForceData, ring: Tire | None, axes: str, notes: list[str]) -> Bru
         )
     notes.append(f"Mz is not used (R2 {fit.r2['Mz']:.2f}): {why}")
     return fit_brush(data, forces=[name for name in fit.rmse if name != "Mz"], tire=ring)
-
-
-def _read(campaign: Campaign) -> tuple[ForceData, list[str]]:
-    """Return the forces, and what of them cannot be used; both read every run."""
-    read: list[Callable[[], Any]] = [partial(force_data, campaign), partial(force_notes, campaign)]
-    data, notes = forked(read)
-    return data, list(notes)
 
 
 def _with_pressure(data: ForceData, ring: Tire, notes: list[str]) -> tuple[ForceData, Tire | None]:
@@ -208,9 +195,8 @@ def _compared(data: ForceData, ring: Tire, notes: list[str]) -> PressureComparis
     chosen = _told(data, chosen, notes)
     if not chosen.size:
         return None
-    limit = min(MOST_COMPARED, MOST_POINTS)
-    if chosen.size > limit:
-        chosen = chosen[:: -(-chosen.size // limit)]
+    if chosen.size > MOST_COMPARED:
+        chosen = chosen[:: -(-chosen.size // MOST_COMPARED)]
     try:
         return compare_pressures(data.take(chosen), ring)
     except TirelibError as error:
@@ -242,18 +228,17 @@ def _numbers(
 ) -> dict[str, Number]:
     """Return the brush as numbers of a tire file."""
     source = f"forces of {campaign.header.name}, {' and '.join(fit.rmse)} at {points} points"
-    pairs = []
-    for each in estimates:
-        pairs.append(stored_number(each.name, each.value, each.std, "fitted", source, each.notes))
-    for name, (value, why) in fit.held.items():
-        if name == "half_length" and fit.tire is not None:
-            continue
-        pairs.append(stored_number(name, value, float("nan"), "assumed", f"not fitted: {why}"))
-    numbers = dict(pairs)
+    numbers = dict(
+        stored_number(each.name, each.value, each.std, "fitted", source, each.notes)
+        for each in estimates
+    )
+    numbers |= dict(
+        stored_number(name, value, nan, "assumed", f"not fitted: {why}")
+        for name, (value, why) in fit.held.items()
+        if not (name == "half_length" and fit.tire is not None)
+    )
     mean = f"median of the points of {campaign.header.name}"
-    numbers["reference_load"] = Number(fit.reference.load, float("nan"), "measured", mean)
-    if np.isfinite(fit.reference.pressure):
-        numbers["reference_pressure"] = Number(
-            fit.reference.pressure, float("nan"), "measured", mean
-        )
-    return numbers
+    at = {"reference_load": fit.reference.load, "reference_pressure": fit.reference.pressure}
+    return numbers | {
+        name: Number(value, nan, "measured", mean) for name, value in at.items() if isfinite(value)
+    }

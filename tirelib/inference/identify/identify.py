@@ -32,6 +32,8 @@ WIDEST = 0.25
 TOLD = 0.6
 """Share of the prior's deviation below which the campaign has added knowledge."""
 
+LENGTHS = ("ring_radius", "free_radius", "belt_width", "tread_thickness", "innerliner_offset")
+"""What a campaign states of its tire."""
 BASES = ("plain", "dissertation")
 """The plain tire, and the ring whose belt does not shear on a road without friction."""
 WITHOUT_EFFECTS: Mapping[str, Any] = {
@@ -50,11 +52,8 @@ class Identification:
     ----------
     tire : TireFile
         With provenance; what the other verbs read.
-    estimates : tuple of Estimate
     correlation : shape (n, n)
         Correlation of the estimates, by the fit.
-    fit : WaveformFit
-    runs : StraightRuns
     notes : tuple of str
         Runs and gages that were not used, and why.
     """
@@ -81,15 +80,12 @@ def identify(
 
     Parameters
     ----------
-    campaign : Campaign
     tire : TireFile, optional
         Start and priors; the campaign's geometry and literature values where it is absent.
     base : str
         One of `BASES`.
     waves : Waveforms, optional
         Waveforms of the campaign, when they have been read already.
-    progress : callable, optional
-        Called with a label after each run and step.
     found : callable, optional
         Called with the fitted tire before the intervals of its numbers are computed.
 
@@ -113,10 +109,11 @@ def identify(
         error.args = (_with_run(str(error), runs),)
         raise
     deviation = np.sqrt(np.diag(fit.covariance))
+    correlation = fit.covariance / np.outer(deviation, deviation)
     return Identification(
-        _fitted_file(start, estimates, campaign, runs, fit),
+        _fitted_file(start, estimates, correlation, campaign, runs, fit),
         estimates,
-        fit.covariance / np.outer(deviation, deviation),
+        correlation,
         fit,
         runs,
         (
@@ -131,16 +128,15 @@ def _contradictions(start: TireFile, estimates: tuple[Estimate, ...]) -> tuple[s
     """Return a sentence for each measured number that the strain does not agree with."""
     out = []
     for each in estimates:
-        given = start.numbers[each.name]
+        given, field = start.numbers[each.name], FIELDS[each.name]
         if given.kind == "measured" and "at_boundary" in each.flags:
-            field = FIELDS[each.name]
             value, said = (
-                from_si(v, field.unit, field.dimension) for v in (each.value, given.value)
+                f"{from_si(v, field.unit, field.dimension):.4g} {field.unit}"
+                for v in (each.value, given.value)
             )
             out.append(
-                f"{each.name}: the strain says {value:.4g} {field.unit}, {given.source} says "
-                f"{said:.4g} {field.unit}; one of them is wrong: correct the length, or the unit "
-                "or gain of the gages"
+                f"{each.name}: the strain says {value}, {given.source} says {said}; one of them is "
+                "wrong: correct the length, or the unit or gain of the gages"
             )
     return tuple(out)
 
@@ -217,20 +213,10 @@ def start_file(
             and (name not in OF_PLAIN or (base == "plain" and number.value > 0.0))
             and np.isfinite(number.value)
         }
-    geometry = header.tire
-    stated: dict[str, float | None] = {
-        "ring_radius": geometry.ring_radius,
-        "free_radius": geometry.free_radius,
-        "belt_width": geometry.belt_width,
-        "tread_thickness": geometry.tread_thickness,
-        "innerliner_offset": geometry.innerliner_offset,
-    }
-    for name, given in stated.items():
-        if given is not None and np.isfinite(given):
-            value = float(given)
-            deviation = 0.05 * abs(value) if name == "innerliner_offset" else float("nan")
-            numbers[name] = Number(value, deviation, "measured", f"{header.name}, campaign.toml")
-    if lacking := [f"{name}_m" for name in stated if name not in numbers]:
+    for name, number in stated_lengths(header).items():
+        unsure = replace(number, std=0.05 * abs(number.value))
+        numbers[name] = unsure if name == "innerliner_offset" else number
+    if lacking := [f"{name}_m" for name in LENGTHS if name not in numbers]:
         raise CalibrationError(
             f"{header.name}: [tire] in campaign.toml does not state {', '.join(lacking)}; the ring "
             "is fitted with these lengths; measure them at the tire and state them there, or give "
@@ -244,8 +230,18 @@ def start_file(
             numbers[f"{prefix}_stiffness"] = Number(
                 old.value + slope * shift, old.std, old.kind, old.source
             )
-    numbers["pressure"] = Number(pressure, float("nan"), "measured", f"{header.name}, mean of runs")
-    return TireFile(geometry.name or header.name, numbers)
+    numbers["pressure"] = Number(pressure, nan, "measured", f"{header.name}, mean of runs")
+    return TireFile(header.tire.name or header.name, numbers)
+
+
+def stated_lengths(header: CampaignHeader) -> dict[str, Number]:
+    """Return the lengths of the tire that a campaign states, by name."""
+    given = {name: getattr(header.tire, name) for name in LENGTHS}
+    return {
+        name: Number(float(value), nan, "measured", f"{header.name}, campaign.toml")
+        for name, value in given.items()
+        if value is not None and np.isfinite(value)
+    }
 
 
 def prior_std(start: TireFile, coordinate: Coordinate) -> float:
@@ -279,25 +275,16 @@ def estimate(fit: WaveformFit, k: int, start: TireFile) -> Estimate:
     low, high = min(low, high), max(low, high)
     low = value - float(np.hypot(value - low, 1.96 * structure))
     high = value + float(np.hypot(high - value, 1.96 * structure))
-    flags: list[str] = []
     prior = coordinate.spread(start.numbers[name].value, float(fit.prior_std[k]))
-    untold = fit_std > TOLD * prior
-    wide = 0.5 * (high - low) > WIDEST * abs(value)
-    if untold or wide:
-        flags.append("not_identifiable")
-    if abs(value - start.numbers[name].value) > 2.5 * prior or _near_limit(name, value):
-        flags.append("at_boundary")
-    if not fit.quadratic[k]:
-        flags.append("not_quadratic")
-    return Estimate(
-        name,
-        value,
-        float(np.hypot(fit_std, structure)),
-        low,
-        high,
-        fit_std,
-        tuple(flags),
-    )
+    untold, wide = fit_std > TOLD * prior, 0.5 * (high - low) > WIDEST * abs(value)
+    far = abs(value - start.numbers[name].value) > 2.5 * prior
+    flags = {
+        "not_identifiable": untold or wide,
+        "at_boundary": far or _near_limit(name, value),
+        "not_quadratic": not fit.quadratic[k],
+    }
+    std = float(np.hypot(fit_std, structure))
+    return Estimate(name, value, std, low, high, fit_std, tuple(f for f, on in flags.items() if on))
 
 
 def _help(estimate: Estimate, fit: WaveformFit, k: int, ways: NextRun) -> str:
@@ -329,16 +316,14 @@ def _near_limit(name: str, value: float) -> bool:
 def _fitted_file(
     start: TireFile,
     estimates: tuple[Estimate, ...],
+    correlation: FloatArray,
     campaign: Campaign,
     runs: StraightRuns,
     fit: WaveformFit,
 ) -> TireFile:
-    numbers = dict(start.numbers)
+    """Return the identified tire as a model without effects; it holds its numbers' correlation."""
     source = _source(campaign, runs)
-    for estimate in estimates:
-        numbers[estimate.name] = Number(
-            estimate.value, estimate.std, "fitted", source, estimate.notes
-        )
+    fitted = {e.name: Number(e.value, e.std, "fitted", source, e.notes) for e in estimates}
     provenance = {
         "method": "whole waveforms, Gauss-Newton with structural misfit",
         "tirelib": __version__,
@@ -347,7 +332,13 @@ def _fitted_file(
         "runs": [int(run) for run in runs.waves.run],
         "rms_microstrain": 1e6 * fit.rms,
     }
-    return TireFile(start.name, numbers, {"provenance": provenance})
+    names = [each.name for each in estimates]
+    extra = {
+        "provenance": provenance,
+        "identified_correlation": {"names": names, "values": correlation.tolist()},
+        **WITHOUT_EFFECTS,
+    }
+    return TireFile(start.name, {**start.numbers, **fitted}, extra)
 
 
 def _without_intervals(

@@ -59,7 +59,6 @@ def laboratory_tests(
     ----------
     values : mapping
         Numbers of the fitted tire.
-    free : tuple of Coordinate
     pressures : (float, float), [Pa]
         The lowest and the highest that can be set. Tests there are left out where the fitted
         slopes leave no stiffness: the tire cannot be as fitted so far away.

@@ -24,7 +24,7 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import Tire
 from tirelib.inference.identify.brush_fit import fit_brush
-from tirelib.inference.identify.error_bands import bands, levels
+from tirelib.inference.identify.error_bands import bands, cells_of_load
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.identify.ring_patch import profiles
 from tirelib.physics.brush.forces import brush_forces
@@ -56,12 +56,11 @@ class PressureBand:
     ----------
     by, low, high : str, float, float
         Condition (all, load, pressure, slip_angle) and its range.
-    points : int
-    ring, parabola : float
+    ring_rmse, parabola_rmse : float
         Root mean square error of the fit to all points.
     ring_bias, parabola_bias : float
         Mean of abs(predicted) less abs(measured): positive overestimates.
-    ring_unseen, parabola_unseen : float
+    ring_rmse_unseen, parabola_rmse_unseen : float
         Root mean square error where the point was not in the fit.
     gain : float
         Mean difference of the unseen squared errors, parabola less ring, over its standard error,
@@ -74,12 +73,12 @@ class PressureBand:
     low: float
     high: float
     points: int
-    ring: float
-    parabola: float
+    ring_rmse: float
+    parabola_rmse: float
     ring_bias: float
     parabola_bias: float
-    ring_unseen: float
-    parabola_unseen: float
+    ring_rmse_unseen: float
+    parabola_rmse_unseen: float
     gain: float
     better: str
 
@@ -289,13 +288,6 @@ def _check(data: ForceData) -> None:
         )
 
 
-def cells_of_load(data: ForceData) -> IntArray:
-    """Return the number of each point's load and pressure, from 0."""
-    pair = np.stack([levels(data.load), levels(data.pressure)])
-    number = np.unique(pair, axis=1, return_inverse=True)[1]
-    return np.asarray(number, dtype=np.int64).ravel()
-
-
 def _parts(data: ForceData, group: IntArray) -> IntArray:
     """Return five parts, each with every fifth slip angle of every group."""
     order = np.lexsort((data.slip_angle, group))
@@ -321,22 +313,15 @@ def _table(
         better = "no difference"
         if abs(gain) >= SIGNIFICANT:
             better = KINDS[0] if gain > 0.0 else KINDS[1]
-        rms = [float(np.sqrt(np.mean(e[k][m] ** 2))) for e in (error, blind) for k in KINDS]
-        bias = [float(over[kind][m].mean()) for kind in KINDS]
+        sizes = {f"{kind}_rmse": _rms(error[kind][m]) for kind in KINDS}
+        sizes |= {f"{kind}_bias": float(over[kind][m].mean()) for kind in KINDS}
+        sizes |= {f"{kind}_rmse_unseen": _rms(blind[kind][m]) for kind in KINDS}
+        points = int(m.sum())
         out.append(
-            PressureBand(
-                band.by,
-                band.low,
-                band.high,
-                int(m.sum()),
-                rms[0],
-                rms[1],
-                bias[0],
-                bias[1],
-                rms[2],
-                rms[3],
-                gain,
-                better,
-            )
+            PressureBand(band.by, band.low, band.high, points, **sizes, gain=gain, better=better)
         )
     return tuple(out)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -47,7 +47,6 @@ class Remedy:
 
     Attributes
     ----------
-    words : str
     half_width : float
         Half the 95 % interval, in the coordinate (relative to the value for one that is scaled).
     effort : int
@@ -135,7 +134,6 @@ def next_run(fit: WaveformFit, structure: FloatArray) -> NextRun:
 
     Parameters
     ----------
-    fit : WaveformFit
     structure : shape (n_free,)
         Structural standard deviation of each coordinate.
     """

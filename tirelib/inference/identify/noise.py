@@ -110,7 +110,6 @@ def measured_tangents(waves: Waveforms, strain: FloatArray) -> FloatArray:
 
     Parameters
     ----------
-    waves : Waveforms
     strain : shape (n_runs, n_phi), [-]
 
     Returns

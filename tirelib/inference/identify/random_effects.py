@@ -46,13 +46,8 @@ class Whitening:
 def whitening_of(tangent: FloatArray, scale: FloatArray, noise: float) -> Whitening:
     """Return the whitening by noise and set points at a model's tangents.
 
-    Parameters
-    ----------
-    tangent : shape (n_runs, n_phi, 4 or more), [-]
-        By load, pressure, gain and angle; what comes after them is left out.
-    scale : shape (n_runs, 4)
-        Standard deviations of the four.
-    noise : float, [-]
+    Tangents (n_runs, n_phi, 4 or more) are by load, pressure, gain and angle, of which `scale`
+    (n_runs, 4) holds the standard deviations; what comes after them is left out.
     """
     basis, triangle = np.linalg.qr(tangent[..., :4] * scale[:, None, :])
     inside = noise**2 * np.eye(4) + triangle @ triangle.swapaxes(1, 2)

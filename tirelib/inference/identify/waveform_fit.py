@@ -56,8 +56,6 @@ class WaveformFit:
     ----------
     values : mapping
         Every value of the tire, the free ones fitted.
-    found : Posterior
-    problem : WaveformProblem
     whiten : RunWhitening
         About the solution.
     interval : shape (n_free, 2)
@@ -65,7 +63,6 @@ class WaveformFit:
         coordinates follow.
     quadratic : shape (n_free,)
         Whether the surface is a parabola there, so that the standard deviation tells all.
-    steps : int
     """
 
     values: Mapping[str, float | FloatArray]
@@ -133,18 +130,14 @@ def fit_waveforms(
 
     Parameters
     ----------
-    data : Data
     start : mapping
         Values of a tire, by name of `Tire`.
     prior : Prior
         Prior of `free`, about `start`.
-    free : tuple of Coordinate
     changes : sequence of (stage, change)
         Effects that the model has.
     discrepancy : Discrepancy or None
         None leaves the structural misfit out: smallest residual, intervals of noise alone.
-    progress : callable, optional
-        Called with a label after each step.
     found : callable, optional
         Called with the fitted values before their intervals are computed.
 

@@ -39,8 +39,6 @@ class WaveformSolved:
     ----------
     rest : shape (n_runs * n_phi + n_known,)
         Measured less model: strain, then the deflections that take part.
-    point : Point
-    model : Solution
     waveform : shape (n_runs, n_phi)
         The model's, with the delay.
     """
@@ -61,12 +59,10 @@ class WaveformProblem:
 
     Parameters
     ----------
-    data : Data
     start : mapping
         Values of a tire, by name of `Tire`.
     std : shape (n_free,)
         Standard deviations of the coordinates' priors, about the start.
-    free : tuple of Coordinate
     changes : sequence of (stage, change)
         Effects that the model has.
     discrepancy : Discrepancy or None

@@ -97,7 +97,6 @@ class RunWhitening:
 
     Attributes
     ----------
-    strain : Whitening
     depth : Depth or None
         None where no deflection takes part.
     """
@@ -118,7 +117,6 @@ class RunWhitening:
 
         Parameters
         ----------
-        data : Data
         waveform : shape (n_runs, n_phi), [-]
         by_set_point : shape (2, n_runs, n_phi), [-]
             Slopes of the waveform by relative load and pressure.

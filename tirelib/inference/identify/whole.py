@@ -6,13 +6,17 @@ from typing import Any
 
 from tirelib.campaign import Campaign
 from tirelib.core.errors import CalibrationError, TirelibError
-from tirelib.core.parameters import Number, Tire, TireFile
+from tirelib.core.parameters import TireFile
 from tirelib.core.threads import one_thread
 from tirelib.core.version import __version__
-from tirelib.inference.identify.brush_model import STORED
-from tirelib.inference.identify.document import model_file
+from tirelib.inference.identify.brush_law import STORED
 from tirelib.inference.identify.forces import ForceIdentification, identify_forces
-from tirelib.inference.identify.identify import Identification, identify
+from tirelib.inference.identify.identify import (
+    WITHOUT_EFFECTS,
+    Identification,
+    identify,
+    stated_lengths,
+)
 from tirelib.inference.identify.strain_notes import broken_gages, ring_expected
 
 SAME_RADIUS = 0.01
@@ -25,8 +29,6 @@ class Whole:
 
     Attributes
     ----------
-    ring : Identification or None
-    brush : ForceIdentification or None
     reasons : tuple of str
         Why a part is absent, and which runs and gages were not used.
     ring_failed : str
@@ -55,15 +57,12 @@ def identify_whole(
 
     Parameters
     ----------
-    campaign : Campaign
     start : TireFile, optional
         Start and priors of the ring; where the campaign tells no ring, this one gives the contact
         length to the brush.
     base : str
         Base of the ring: plain tire, or the dissertation's
         (`tirelib.inference.identify.identify.BASES`).
-    progress : callable, optional
-        Called with a label at each step.
     found : callable, optional
         Called with the fitted ring before the intervals of its numbers are computed.
 
@@ -87,11 +86,8 @@ def identify_whole(
             failed = why if ring_expected(campaign) else ""
     else:
         reasons.append(f"no ring: {campaign.header.name} holds no strain: it declares no gages")
-    tire: Tire | None = None
-    if ring is not None:
-        tire = ring.tire.tire
-    elif known is not None:
-        tire = known.tire
+    of = ring.tire if ring is not None else known
+    tire = of.tire if of is not None else None
     brush = None
     try:
         brush = identify_forces(campaign, tire, progress=progress)
@@ -134,7 +130,7 @@ def _file(
     brush: ForceIdentification | None,
 ) -> TireFile:
     """Return the model: the ring's file, or a file of geometry, with the brush's numbers."""
-    base = model_file(ring) if ring is not None else _without_ring(campaign, known)
+    base = ring.tire if ring is not None else _without_ring(campaign, known)
     if brush is None:
         return base
     extra: dict[str, Any] = dict(base.extra)
@@ -152,28 +148,15 @@ def _file(
 
 
 def _without_ring(campaign: Campaign, known: TireFile | None) -> TireFile:
-    geometry = campaign.header.tire
-    numbers = dict(known.numbers) if known is not None else {}
-    measured: dict[str, float | None] = {"free_radius": geometry.free_radius}
-    if known is None:
-        measured |= {
-            "ring_radius": geometry.ring_radius,
-            "belt_width": geometry.belt_width,
-            "tread_thickness": geometry.tread_thickness,
-            "innerliner_offset": geometry.innerliner_offset,
-        }
-    source = f"{campaign.header.name}, campaign.toml"
-    for name, value in measured.items():
-        if value is not None:
-            numbers[name] = Number(float(value), float("nan"), "measured", source)
-    extra = {
-        "provenance": {
-            "tirelib": __version__,
-            "campaign": campaign.header.name,
-            "data_sha256": campaign.content_hash(),
-        },
-        "model": {"ring": "large displacements", "contact": "radial"} if known is not None else {},
-        "effects": [],
-        "history": [],
+    """Return a file of what the campaign states, beside the ring of the given tire if any."""
+    numbers, lengths = dict(known.numbers if known else {}), stated_lengths(campaign.header)
+    numbers |= {k: v for k, v in lengths.items() if known is None or k == "free_radius"}
+    provenance = {
+        "tirelib": __version__,
+        "campaign": campaign.header.name,
+        "data_sha256": campaign.content_hash(),
     }
-    return TireFile(geometry.name or campaign.header.name, numbers, extra)
+    extra: dict[str, Any] = {"provenance": provenance, **WITHOUT_EFFECTS}
+    if known is None:
+        extra["model"] = {}
+    return TireFile(campaign.header.tire.name or campaign.header.name, numbers, extra)

@@ -12,11 +12,18 @@ from tirelib.inference.compare.forces import UNITS
 from tirelib.inference.diagnose.diagnose import FALSE_ALARM
 from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.diagnose.forces.models import plain_tires
-from tirelib.inference.planning.criterion import ENDLESS, NOTHING, WANTED, NextTest, PairForecast
+from tirelib.inference.diagnose.strain_models import problem_of
 from tirelib.inference.planning.envelope import AXES, Envelope
-from tirelib.inference.planning.next_test import gains, next_test
+from tirelib.inference.planning.next_test import (
+    ENDLESS,
+    NOTHING,
+    WANTED,
+    NextTest,
+    PairForecast,
+    gains,
+    next_test,
+)
 from tirelib.inference.planning.suspects import Suspects, suspects_of
-from tirelib.inference.problems.strain import StrainProblem
 from tirelib.inference.statistics.select import Hypotheses
 
 FORMAT = "tirelib-next-test/1"
@@ -34,7 +41,6 @@ class Plan:
 
     Attributes
     ----------
-    suspects : Suspects
     test : NextTest or None
         None where nothing is in doubt.
     gains : mapping
@@ -42,7 +48,6 @@ class Plan:
         (`tirelib.inference.planning.next_test.gains`).
     wanted : float
         Separation asked for.
-    campaign : str
     quantity : str
         strain, or the force.
     """
@@ -66,17 +71,8 @@ def plan_test(
 ) -> Plan:
     """Judge the runs of an envelope for suspects of strain.
 
-    Parameters
-    ----------
-    hypotheses : Hypotheses or None
-        About the present runs; needed if there are suspects.
-    suspects : Suspects
-    envelope : Envelope
-    campaign : str
-        Its name.
-    wanted : float
-        Separation for which repeats are counted.
-    progress : callable, optional
+    Hypotheses are about the present runs, and needed if there are suspects. `wanted` is the
+    separation for which repeats are counted.
 
     Raises
     ------
@@ -99,20 +95,10 @@ def plan_force_test(
     wanted: float = WANTED,
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
-    """Judge further runs of a force for suspects: points, or sweeps.
+    """Judge further runs of a force for suspects: points, or sweeps; errors as of `plan_test`.
 
-    Other parameters, and errors, as in `plan_test`.
-
-    Parameters
-    ----------
-    case : ForceCase
-    envelope : Envelope or None
-        The one of `tirelib.inference.planning.force_runs.force_envelope`; needed if there are
-        suspects.
-    catalogue : sequence of Effect
-        What the suspects are held against.
-    false_alarm : float
-        Probability with which a plain tire is said to lack something.
+    The envelope is the one of `tirelib.inference.planning.force_runs.force_envelope`, and needed if
+    there are suspects, which are held against the catalogue.
     """
     if not suspects.effects or envelope is None:
         return Plan(suspects, None, {}, wanted, case.name, case.quantity)
@@ -138,8 +124,6 @@ def next_test_document(
         The diagnosis as JSON.
     hypotheses : Hypotheses
         Hypotheses of the diagnosis.
-    catalogue : mapping of name to Effect
-    progress : callable, optional
 
     Raises
     ------
@@ -149,32 +133,28 @@ def next_test_document(
     suspects, campaign = suspects_of(told, catalogue), str(told.get("campaign", ""))
     if not suspects.effects:
         return plan_document(Plan(suspects, None, {}, WANTED, campaign))
-    problem = hypotheses.problem
-    assert isinstance(problem, StrainProblem)  # noqa: S101 - the diagnosis is of strain
-    envelope = Envelope.of(problem.data.points)
-    return plan_document(
-        plan_test(hypotheses, suspects, envelope, campaign=campaign, progress=progress)
-    )
+    envelope = Envelope.of(problem_of(hypotheses).data.points)
+    plan = plan_test(hypotheses, suspects, envelope, campaign=campaign, progress=progress)
+    return plan_document(plan)
 
 
 def plan_document(plan: Plan) -> dict[str, Any]:
     """Return a plan as ``tirelib-next-test/1``: N, bar, km/h, microstrain."""
-    test = plan.test
+    test, said = plan.test, advice(plan)
     head = {
         "format": FORMAT,
         "campaign": plan.campaign,
         "axes": "iso",
         "quantity": plan.quantity,
-        "what": advice(plan),
-        "message": advice(plan),
+        "what": said,
+        "message": said,
         "between": list(plan.suspects.names),
         "why": plan.suspects.why,
     }
     if test is None or not len(test.points):
-        left_out = dict(test.trial.left_out) if test else {}
         return head | {
             "suspects": [],
-            "left_out": left_out,
+            "left_out": dict(test.left_out) if test else {},
             "present": [],
             "candidates": [],
             "best": None,
@@ -192,9 +172,9 @@ def plan_document(plan: Plan) -> dict[str, Any]:
                 "chi_square": rival.cost,
                 "in_range": rival.in_range,
             }
-            for rival in test.trial.rivals
+            for rival in test.rivals
         ],
-        "left_out": dict(test.trial.left_out),
+        "left_out": dict(test.left_out),
         "present": [_present(pair) for pair in test.pairs],
         "candidates": candidates,
         "best": candidates[0],
@@ -206,16 +186,15 @@ def plan_document(plan: Plan) -> dict[str, Any]:
         "envelope": _envelope(test.envelope),
         "dropped": test.dropped,
         **_noise(plan, test),
-        "misfit_size": test.trial.size,
+        "misfit_size": test.size,
     }
 
 
 def _noise(plan: Plan, test: NextTest) -> dict[str, Any]:
-    random, staying = test.noise.random, test.noise.staying
     if plan.quantity == "strain":
-        return {"noise_ustrain": {"random": 1e6 * random, "structural": 1e6 * staying}}
+        return {"noise_ustrain": {"random": 1e6 * test.random, "structural": 1e6 * test.staying}}
     unit = UNITS[plan.quantity]
-    return {"noise": {"random": random, "structural": staying, "unit": unit}}
+    return {"noise": {"random": test.random, "structural": test.staying, "unit": unit}}
 
 
 def _candidate(test: NextTest, k: int) -> dict[str, Any]:
@@ -263,13 +242,7 @@ def _repeats(plan: Plan, test: NextTest) -> dict[str, Any]:
         "limit": pair.limit,
         "separation": {str(n): reached for n, reached in pair.repeats.items()},
         "of_plan": {
-            name: {
-                "times": next(
-                    (int(n) for n, x in by.items() if n < ENDLESS and x >= PROMISING), None
-                ),
-                "gain_now": by[1],
-                "gain_limit": by[ENDLESS],
-            }
+            name: {"times": _times(by), "gain_now": by[1], "gain_limit": by[ENDLESS]}
             for name, by in plan.gains.items()
         },
     }
@@ -299,7 +272,7 @@ def advice(plan: Plan) -> str:
     if test is None:
         return NONE
     if not len(test.points):
-        left = "; ".join(f"{name}: {why}" for name, why in test.trial.left_out.items())
+        left = "; ".join(f"{name}: {why}" for name, why in test.left_out.items())
         return f"fewer than two suspects could be fitted, so nothing can be compared ({left})"
     sentences = [_said(pair) for pair in test.pairs if pair.resolved]
     if test.open_pairs:
@@ -361,7 +334,7 @@ def _weak(plan: Plan) -> list[str]:
     """Say what repeating the whole plan would do for hints."""
     said = []
     for name, by in plan.gains.items():
-        times = next((int(n) for n, x in by.items() if n < ENDLESS and x >= PROMISING), None)
+        times = _times(by)
         if times == 1:
             said.append(
                 f"the present plan should show {name} at this strength already "
@@ -377,6 +350,11 @@ def _weak(plan: Plan) -> list[str]:
                 f"{_chance(by[ENDLESS])}, and {_chance(PROMISING)} is needed"
             )
     return said
+
+
+def _times(by: Mapping[float, float]) -> int | None:
+    """Return how often the plan has to be measured to show an effect."""
+    return next((int(n) for n, x in by.items() if n < ENDLESS and x >= PROMISING), None)
 
 
 def _chance(size: float) -> str:

@@ -1,7 +1,7 @@
 """The conditions that a rig allows, and a grid of possible runs in them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -103,15 +103,10 @@ class Envelope:
 
     @classmethod
     def of(cls, points: Any, axes: Sequence[str] = STRAIN, **declared: Any) -> "Envelope":
-        """Return the declared ranges; else those of measured points, widened.
+        """Return the declared ranges of the axes that may be set, by axis, SI.
 
-        Parameters
-        ----------
-        points : Operating or BrushConditions
-        axes : sequence of str
-            That may be set.
-        declared : (low, high) or None
-            By axis, SI.
+        What is None or not declared is that of measured points (`Operating` or `BrushConditions`),
+        widened.
 
         Raises
         ------
@@ -208,8 +203,7 @@ def _campaigns(points: Any, name: str) -> Range:
     if not np.isfinite(values).all() or (axis.positive and not (values > 0.0).all()):
         raise ParameterError(
             f"envelope: the campaign does not tell its {axis.quantity.title} in every run; declare "
-            "the "
-            f"range with --{name.replace('_', '-')}-range"
+            f"the range with --{name.replace('_', '-')}-range"
         )
     low, high = float(values.min()), float(values.max())
     return low * (1.0 - axis.wider), high * (1.0 + axis.wider)
@@ -221,25 +215,12 @@ def operating_at(wanted: FloatArray, present: Operating) -> Operating:
     What else a run has (temperature, drag, turn rate over speed) is as in the present runs, on
     average.
     """
-    n = len(wanted)
-    mean = {
-        name: np.full(n, _mean(getattr(present, name)))
-        for name in (
-            "camber",
-            "slip_angle",
-            "slip_ratio",
-            "side_force",
-            "drive_force",
-            "temperature",
-        )
-    }
-    load, pressure, speed = wanted.T
+    n, (load, pressure, speed) = len(wanted), wanted.T
     rate = float(np.median(present.omega / present.speed))
-    return Operating(
-        load=load, pressure=pressure, speed=speed, omega=rate * speed, order=np.ones(n), **mean
-    )
-
-
-def _mean(values: FloatArray) -> float:
-    """Return the mean; NaN unless every value is known."""
-    return float(np.mean(values))
+    set_ = {"load": load, "pressure": pressure, "speed": speed, "omega": rate * speed}
+    others = {
+        field.name: np.full(n, float(np.mean(getattr(present, field.name))))
+        for field in fields(Operating)
+        if field.name not in set_
+    }
+    return Operating(**(others | set_ | {"order": np.ones(n)}))

@@ -30,15 +30,9 @@ def force_axes(case: ForceCase) -> tuple[str, ...]:
 
 
 def force_envelope(case: ForceCase, sweep: bool | None = None, **declared: Any) -> Envelope:
-    """Return the envelope of further runs of a force: sweeps where the campaign's runs are such.
+    """Return the envelope of further runs of a force, with ranges declared as for `Envelope.of`.
 
-    Parameters
-    ----------
-    case : ForceCase
-    sweep : bool, optional
-        Whether a run is a sweep of the slip; by default as the campaign's runs are.
-    declared : (low, high) or None
-        By axis, SI, as for `Envelope.of`.
+    `sweep` says whether a run is a sweep of the slip; by default as the campaign's runs are.
 
     Raises
     ------

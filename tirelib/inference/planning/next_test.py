@@ -1,6 +1,7 @@
 """The next test of strain and of forces: rivals, and possible runs by what they do to them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,16 +9,6 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import ParameterError, TirelibError
 from tirelib.core.threads import one_thread
 from tirelib.inference.compare.force_model import ForceModel
-from tirelib.inference.planning.criterion import (
-    ENDLESS,
-    NOTHING,
-    REPEATS,
-    NextTest,
-    Noise,
-    PairForecast,
-    Suspect,
-    Trial,
-)
 from tirelib.inference.planning.envelope import Envelope, operating_at
 from tirelib.inference.planning.force_runs import bench_ahead
 from tirelib.inference.planning.suspects import Suspects
@@ -28,11 +19,135 @@ from tirelib.inference.statistics.next_run import Ahead, next_runs
 from tirelib.inference.statistics.problem import Point
 from tirelib.inference.statistics.select import Hypotheses
 
+NOTHING = "no_effect"
+"""Name of the rival that needs no further effect."""
+LEAST_SEPARATION = 1.0
+"""Separation below which a run tells nothing: noise alone moves the chi-square of one number so."""
+WANTED = 20.0
+"""Separation that one asks for: odds of e^10 against the wrong rival."""
+REPEATS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
+"""Repeats of the best run that are looked at."""
+ENDLESS = 1e6
+"""Repeats that average everything that repeats can average."""
 PLAN_REPEATS = (1, 2, 3, 4, 6, 8, 12)
 """Times that the whole plan is measured."""
 MANY = 1e3
 """Repeats that stand for endless ones: the noise is far below the misfit of a run then, and normal
 equations of still less noise are not accurate."""
+
+
+@dataclass(frozen=True, slots=True)
+class Suspect:
+    """A suspect fitted to the present runs.
+
+    Attributes
+    ----------
+    name : str
+        Name of the effect, or `NOTHING`.
+    cost : float
+        Chi-square left on the present runs, less that of no effect.
+    strength : shape (components,)
+        In the effect's unit; empty for `NOTHING`.
+    in_range : bool
+        Whether it is plausible, give or take two standard deviations.
+    """
+
+    name: str
+    cost: float
+    strength: FloatArray
+    in_range: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PairForecast:
+    """Two rivals, now and at every possible run.
+
+    Attributes
+    ----------
+    names : (str, str)
+    gap : float
+        Chi-square by which the second is worse on the present runs; negative: the first.
+    resolved : bool
+        Whether the present runs leave exactly one of them in the confidence set.
+    separation : shape (n,)
+        Expected further chi-square by one run.
+    probability : shape (n,)
+        That one run puts one of them out of it; NaN where both are out already.
+    repeats : mapping of number to float
+        Separation by so many repeats of the best run.
+    limit : float
+        Separation that no number of repeats exceeds.
+    """
+
+    names: tuple[str, str]
+    gap: float
+    resolved: bool
+    separation: FloatArray
+    probability: FloatArray
+    repeats: Mapping[int, float]
+    limit: float
+
+    @property
+    def better(self) -> str:
+        """The rival that the present runs like better."""
+        return self.names[0] if self.gap >= 0.0 else self.names[1]
+
+    def needed(self, wanted: float) -> int | None:
+        """Return the fewest repeats of the best run with a separation, None beyond `REPEATS`."""
+        return next((n for n, reached in self.repeats.items() if reached >= wanted), None)
+
+
+@dataclass(frozen=True, slots=True)
+class NextTest:
+    """The possible runs, judged.
+
+    Attributes
+    ----------
+    points : shape (n, axes), SI
+        The possible runs on the envelope's axes, best first.
+    score, std, probability : shape (n,)
+        Separation of the pair that is hardest there, its standard deviation, and mean chance to
+        rule a rival out.
+    hardest : tuple of int
+        Index of that pair, per run.
+    pairs : tuple of PairForecast
+        In the order of the points.
+    rivals : tuple of Suspect
+        Suspects on the present runs whose fits have settled.
+    size : float
+        Size of the structural misfit; 1 is that of plain tires.
+    dropped : int
+        Possible runs at which a rival has no solution.
+    random, staying : float
+        Random parts of a run's samples: between repeated runs, and the misfit that a run has for
+        itself, which repeats do not average.
+    """
+
+    envelope: Envelope
+    points: FloatArray
+    score: FloatArray
+    std: FloatArray
+    probability: FloatArray
+    hardest: tuple[int, ...]
+    pairs: tuple[PairForecast, ...]
+    rivals: tuple[Suspect, ...]
+    left_out: Mapping[str, str]
+    size: float
+    dropped: int
+    random: float
+    staying: float
+
+    @property
+    def open_pairs(self) -> tuple[PairForecast, ...]:
+        """Pairs that the present runs do not part."""
+        return tuple(pair for pair in self.pairs if not pair.resolved)
+
+    @property
+    def hopeless(self) -> bool:
+        """Whether no run parts any of the open pairs."""
+        return bool(self.open_pairs) and all(
+            float(np.max(pair.separation)) < LEAST_SEPARATION for pair in self.open_pairs
+        )
 
 
 class _Runs:
@@ -97,12 +212,10 @@ def next_test(
     ----------
     hypotheses : Hypotheses
         About the present runs (a `StrainProblem` or a `ForceProblem`).
-    suspects : Suspects
     envelope : Envelope
         For forces the one of `tirelib.inference.planning.force_runs.force_envelope`.
     model : ForceModel, optional
         The brush, of forces.
-    progress : callable, optional
 
     Raises
     ------
@@ -110,65 +223,63 @@ def next_test(
         If no run in the envelope has a solution.
     """
     tell = progress or (lambda label: None)
-    problem = _problem(hypotheses)
+    problem, chosen = _problem(hypotheses), envelope.grid()
     rivals, left_out = _fitted(hypotheses, suspects)
-    trial = Trial(
+    points, dropped = np.zeros((0, len(envelope.names))), 0
+    score = std = chance = np.zeros(0)
+    hardest: tuple[int, ...] = ()
+    pairs: tuple[PairForecast, ...] = ()
+    if len(rivals) > 1:
+        fits, names, runs = list(rivals.values()), list(rivals), _Runs(problem, envelope, model)
+        good = runs.possible(fits, chosen)
+        if not good.any():
+            raise ParameterError(
+                f"envelope: the model has no solution at any of its {len(chosen)} runs (tread "
+                "pressed through, or too large a patch); lower the loads of --load-range"
+            )
+        points, dropped = chosen[good], int((~good).sum())
+        tell(f"{len(points)} runs with {' and '.join(rivals)}")
+        alpha = hypotheses.false_alarm
+        parted = next_runs(runs.ahead(points, np.ones(len(points))), fits, alpha)
+        open_ = [k for k, pair in enumerate(parted) if not pair.resolved] or range(len(parted))
+        size = np.array([parted[k].separation for k in open_])
+        told = [parted[k].chance for k in open_ if np.isfinite(parted[k].chance).all()]
+        chance = np.mean(told, axis=0) if told else np.full(len(points), np.nan)
+        least = [open_[k] for k in np.argmin(size, axis=0)]
+        score = np.min(size, axis=0)
+        std = np.array([parted[pair].std[run] for run, pair in enumerate(least)])
+        order = np.lexsort((-score, -np.round(np.nan_to_num(chance), 3)))
+        tell("repeats of the best run")
+        best = np.repeat(points[order[:1]], len(REPEATS) + 1, axis=0)
+        again = next_runs(runs.ahead(best, np.array([*REPEATS, ENDLESS])), fits, alpha)
+        pairs = tuple(
+            PairForecast(
+                (names[pair.first], names[pair.second]),
+                pair.gap,
+                pair.resolved,
+                pair.separation[order],
+                pair.chance[order],
+                dict(zip(REPEATS, repeated.separation.tolist(), strict=False)),
+                float(repeated.separation[-1]),
+            )
+            for pair, repeated in zip(parted, again, strict=True)
+        )
+        points, score, std, chance = points[order], score[order], std[order], chance[order]
+        hardest = tuple(least[k] for k in order)
+    return NextTest(
+        envelope,
+        points,
+        score,
+        std,
+        chance,
+        hardest,
+        pairs,
         tuple(_suspect(name, rival, hypotheses) for name, rival in rivals.items()),
         left_out,
         hypotheses.base.null.size.whole,
-    )
-    noise = Noise(float(np.mean(problem.noise)), problem.own_misfit(hypotheses.own))
-    chosen = envelope.grid()
-    if len(rivals) < 2:
-        empty, none = np.zeros(0), np.zeros((0, len(envelope.names)))
-        return NextTest(envelope, none, empty, empty, empty, (), (), trial, 0, noise)
-    fits, runs = list(rivals.values()), _Runs(problem, envelope, model)
-    good = runs.possible(fits, chosen)
-    if not good.any():
-        raise ParameterError(
-            f"envelope: the model has no solution at any of its {len(chosen)} runs (tread pressed "
-            "through, or too large a patch); lower the loads of --load-range"
-        )
-    points = chosen[good]
-    tell(f"{len(points)} runs with {' and '.join(rivals)}")
-    alpha = hypotheses.false_alarm
-    parted = next_runs(runs.ahead(points, np.ones(len(points))), fits, alpha)
-    open_ = [pair for pair in parted if not pair.resolved] or parted
-    size = np.array([pair.separation for pair in open_])
-    told = [pair.chance for pair in open_ if np.isfinite(pair.chance).all()]
-    chance = np.mean(told, axis=0) if told else np.full(len(points), np.nan)
-    hardest = np.argmin(size, axis=0)
-    score = np.min(size, axis=0)
-    std = np.array([open_[pair].std[run] for run, pair in enumerate(hardest)])
-    order = np.lexsort((-score, -np.round(np.nan_to_num(chance), 3)))
-    tell("repeats of the best run")
-    best = np.repeat(points[order[:1]], len(REPEATS) + 1, axis=0)
-    again = next_runs(runs.ahead(best, np.array([*REPEATS, ENDLESS])), fits, alpha)
-    names = list(rivals)
-    pairs = tuple(
-        PairForecast(
-            (names[pair.first], names[pair.second]),
-            pair.gap,
-            pair.resolved,
-            pair.separation[order],
-            pair.chance[order],
-            dict(zip(REPEATS, repeated.separation.tolist(), strict=False)),
-            float(repeated.separation[-1]),
-        )
-        for pair, repeated in zip(parted, again, strict=True)
-    )
-    places = [parted.index(pair) for pair in open_]
-    return NextTest(
-        envelope,
-        points[order],
-        score[order],
-        std[order],
-        chance[order],
-        tuple(places[k] for k in hardest[order]),
-        pairs,
-        trial,
-        len(chosen) - len(points),
-        noise,
+        dropped,
+        float(np.mean(problem.noise)),
+        problem.own_misfit(hypotheses.own),
     )
 
 
@@ -219,15 +330,13 @@ def gains(
     if not suspects.with_nothing or nothing is None:
         return {}
     limit = nothing.limit(hypotheses.false_alarm)
-    out: dict[str, dict[float, float]] = {
-        rival.name: {} for rival in test.trial.rivals if rival.name != NOTHING
-    }
+    rivals = [rival for rival in test.rivals if rival.name != NOTHING]
+    out: dict[str, dict[float, float]] = {rival.name: {} for rival in rivals}
     for times in (*PLAN_REPEATS, ENDLESS):
         again = nothing.fit.view(problem.repeated(min(times, MANY)), nothing.null.view.own)
         null = nothing.null.about(again, nothing.null.size)
-        for rival in test.trial.rivals:
-            if rival.name != NOTHING:
-                effect = hypotheses.effects[rival.name]
-                ranges = float(np.linalg.norm(rival.strength)) / effect.scale
-                out[rival.name][times] = null.power(rival.name, ranges, limit)
+        for rival in rivals:
+            scale = hypotheses.effects[rival.name].scale
+            ranges = float(np.linalg.norm(rival.strength)) / scale
+            out[rival.name][times] = null.power(rival.name, ranges, limit)
     return out

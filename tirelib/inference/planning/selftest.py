@@ -15,6 +15,7 @@ from tirelib.core.errors import ParameterError
 from tirelib.core.threads import one_thread
 from tirelib.effects import Effect
 from tirelib.inference.diagnose.diagnose import FALSE_ALARM, plain_tires, twins_of
+from tirelib.inference.diagnose.strain_models import problem_of
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.problems.strain import StrainProblem
 from tirelib.inference.statistics.chance import Plans
@@ -31,7 +32,6 @@ class Planting:
 
     Attributes
     ----------
-    effect : Effect
     ratio : float
         The error with the effect over that without.
     strength : float
@@ -74,10 +74,8 @@ class SelfTest:
 
     Attributes
     ----------
-    plantings : tuple of Planting
     alarms : int
         Tires without any effect in which that nothing is missing is rejected.
-    dead : mapping of name to reason
     twins : mapping of name to sequence of (name, angle [rad])
     largest : mapping of name to float
         Error ratio at the end of the range, to first order.
@@ -85,9 +83,6 @@ class SelfTest:
         What this tire shows in addition to its model, over what plain tires of the family that
         excuses most show.
     noise : float, [-]
-    false_alarm : float
-    repeats, seed : int
-    campaign : str
     """
 
     plantings: tuple[Planting, ...]
@@ -122,24 +117,16 @@ def selftest(
 
     Parameters
     ----------
-    runs : StraightRuns
     values : mapping
-        Numbers of the model's tire.
+        Numbers of the model's tire; it has the `effects` at these `strengths` already.
     catalogue : sequence of Effect
         Everyone that a diagnosis looks at.
-    effects, strengths
-        That the model has already.
     only : sequence of str
         Effects to plant; all living ones if empty.
     ratios : sequence of float
         Errors with the effect over those without, above 1.
     repeats : int
-        Tires in which each effect is planted.
-    false_alarm : float
-        Probability with which a plain tire is said to lack something.
-    seed : int
-        It decides which plain tires are chosen.
-    progress : callable, optional
+        Tires in which each effect is planted; the seed decides which plain tires these are.
 
     Raises
     ------
@@ -157,8 +144,7 @@ def selftest(
         )
     given = StrainProblem(runs, values, catalogue, effects, strengths)
     among = Hypotheses(given, families, false_alarm, progress)
-    problem, base = among.problem, among.base
-    assert isinstance(problem, StrainProblem)  # noqa: S101 - as the given one
+    problem, base = problem_of(among), among.base
     plans = Plans(problem, base, false_alarm, repeats, seed)
     plantings = []
     for effect in problem.living:
@@ -170,13 +156,12 @@ def selftest(
             size = plans.strength(effect.name, ratio)
             strength = float(np.sign(effect.toward)) * size * effect.scale
             reachable = size <= abs(effect.toward) / effect.scale
-            if not reachable:
-                plantings.append(Planting(effect, ratio, strength, False, (), 0))
-                continue
-            found = plans.planted(effect.name, strength / effect.scale)
-            plantings.append(
-                Planting(effect, ratio, strength, True, found.named(), int(found.rejected.sum()))
-            )
+            named: tuple[tuple[str, ...], ...] = ()
+            seen = 0
+            if reachable:
+                found = plans.planted(effect.name, strength / effect.scale)
+                named, seen = found.named(), int(found.rejected.sum())
+            plantings.append(Planting(effect, ratio, strength, reachable, named, seen))
     return SelfTest(
         tuple(plantings),
         int(plans.plain().rejected.sum()),

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-import numpy as np
 from scipy.stats import binomtest
 
+from tirelib.inference.diagnose.diagnose import twins_told
 from tirelib.inference.planning.selftest import Planting, SelfTest
 
 FORMAT = "tirelib-selftest/1"
@@ -42,10 +42,7 @@ def selftest_document(found: SelfTest) -> dict[str, Any]:
                 "title": each[0].effect.title,
                 "unit": each[0].effect.unit,
                 "largest_ratio": found.largest[name],
-                "twins": [
-                    {"effect": twin, "angle_deg": float(np.rad2deg(angle))}
-                    for twin, angle in found.twins[name]
-                ],
+                "twins": twins_told(found.twins[name]),
                 "results": [_result(planting) for planting in each],
             }
             for name, each in by_name.items()

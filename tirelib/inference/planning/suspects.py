@@ -48,13 +48,7 @@ def suspects_of(told: Mapping[str, Any], catalogue: Mapping[str, Effect]) -> Sus
 
     Effects of the smallest sets that are not in all of them; else a named effect with its twins
     that are alarms or hints; else, where nothing is named, the leading hints, each against
-    nothing.
-
-    Parameters
-    ----------
-    told : mapping
-        A diagnosis as JSON, ``tirelib-diagnosis/1``.
-    catalogue : mapping of name to Effect
+    nothing. `told` is a diagnosis as JSON, ``tirelib-diagnosis/1``.
 
     Raises
     ------
@@ -101,18 +95,17 @@ def _of(
     why: str,
 ) -> Suspects:
     def pair(name: str) -> tuple[Effect, FloatArray]:
-        effect = _known(name, catalogue)
-        strength = entries.get(name, {}).get("strength")
+        if name not in catalogue:
+            raise ParameterError(
+                f"the diagnosis names {name!r}, which is not known; load the file that defines it "
+                "with --effects, or diagnose again"
+            )
+        effect, strength = catalogue[name], entries.get(name, {}).get("strength")
         if strength is None:
             return effect, np.full(effect.components, START * effect.toward)
         return effect, np.atleast_1d(np.asarray(strength, dtype=float))
 
-    return Suspects(
-        tuple(pair(name) for name in names),
-        tuple(pair(name) for name in beside),
-        with_nothing,
-        why,
-    )
+    return Suspects(tuple(map(pair, names)), tuple(map(pair, beside)), with_nothing, why)
 
 
 def given_suspects(
@@ -156,12 +149,3 @@ def given_suspects(
 def _nearest(name: str, catalogue: Mapping[str, Effect]) -> str:
     near = get_close_matches(name, catalogue, n=3)
     return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(catalogue)}"
-
-
-def _known(name: str, catalogue: Mapping[str, Effect]) -> Effect:
-    if name not in catalogue:
-        raise ParameterError(
-            f"the diagnosis names {name!r}, which is not known; load the file that defines it "
-            "with --effects, or diagnose again"
-        )
-    return catalogue[name]

@@ -76,15 +76,9 @@ def campaign_sweep(points: ForcePoints, name: str, wanted: bool | None = None) -
 
     A run is a stretch of points that follow each other at one load, pressure, camber and speed. It
     is one of several points if it has `FEWEST_SLIPS` slips. Where most points are in such runs,
-    the one with the most different slips is returned, each slip once in each direction.
-
-    Parameters
-    ----------
-    points : ForcePoints
-    name : str
-        slip_angle or slip_ratio.
-    wanted : bool, optional
-        False: always None. True: all slips of the campaign where its runs are single points.
+    the one with the most different slips is returned, each slip once in each direction. If `wanted`
+    is False, the return is always None; if it is True, all slips of the campaign where its runs are
+    single points.
     """
     if wanted is False:
         return None

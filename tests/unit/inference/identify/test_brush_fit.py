@@ -221,7 +221,7 @@ class TestRing:
         assert not {"load_power", "half_length"} & set(fit.names)
         assert fit.values["lateral_stiffness"] == pytest.approx(C, rel=1e-5)
         assert fit.values["friction"] == pytest.approx(MU, rel=1e-5)
-        np.testing.assert_allclose(fit.predict(data).Fy, data.Fy, atol=0.05)
+        np.testing.assert_allclose(fit.brush.predict(data).Fy, data.Fy, atol=0.05)
 
     def test_many_points_are_read_from_a_surface(self) -> None:
         rng = np.random.default_rng(3)

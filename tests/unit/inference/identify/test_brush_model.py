@@ -8,8 +8,14 @@ import pytest
 from tests.unit.inference.identify.test_brush_fit import LOADS, WIDE, make
 from tirelib.core.errors import CalibrationError, FormatError, ParameterError
 from tirelib.core.parameters import NUMBERS, Number, TireFile, read_tire, write_tire
-from tirelib.inference.identify.brush_law import SPECS, Reference, predict
-from tirelib.inference.identify.brush_model import STORED, brush_of, stored_number
+from tirelib.inference.identify.brush_law import (
+    SPECS,
+    STORED,
+    Reference,
+    brush_of,
+    predict,
+    stored_number,
+)
 from tirelib.inference.identify.ring_patch import half_lengths
 
 BASE = read_tire("table-6-1")

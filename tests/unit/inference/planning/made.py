@@ -11,9 +11,8 @@ from tirelib.effects import CATALOGUE
 from tirelib.effects.state import Operating
 from tirelib.inference.diagnose.diagnose import plain_tires
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
-from tirelib.inference.planning.criterion import NextTest
 from tirelib.inference.planning.envelope import Envelope
-from tirelib.inference.planning.next_test import next_test
+from tirelib.inference.planning.next_test import NextTest, next_test
 from tirelib.inference.planning.suspects import Suspects, given_suspects
 from tirelib.inference.problems.strain import StrainProblem
 from tirelib.inference.statistics.select import Hypotheses

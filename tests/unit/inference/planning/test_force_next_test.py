@@ -14,10 +14,10 @@ from tirelib.inference.diagnose.assess import ForceAssessment, assess_forces
 from tirelib.inference.diagnose.document import diagnosis_document
 from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.diagnose.forces.models import plain_tires
-from tirelib.inference.planning.criterion import NOTHING, NextTest
 from tirelib.inference.planning.document import Plan, advice, plan_document, plan_force_test
 from tirelib.inference.planning.envelope import Envelope
 from tirelib.inference.planning.force_runs import bench_ahead, force_axes
+from tirelib.inference.planning.next_test import NOTHING, NextTest
 from tirelib.inference.planning.suspects import given_suspects, suspects_of
 from tirelib.inference.statistics.problem import Point
 from tirelib.inference.statistics.select import Hypotheses
@@ -218,7 +218,7 @@ def test_the_whole_plan_again_shows_an_effect_more_likely() -> None:
     alone = given_suspects(PAIR[:1], [], CATALOGUE, "Fy")
     plan = plan_force_test(made, alone, envelope(made))
     assert plan.test is not None
-    assert [rival.name for rival in plan.test.trial.rivals] == [PAIR[0], NOTHING]
+    assert [rival.name for rival in plan.test.rivals] == [PAIR[0], NOTHING]
     chances = list(plan.gains[PAIR[0]].values())
     assert (np.diff(chances) >= -1e-9).all()
     assert 0.0 < chances[0] < chances[-1] <= 1.0

@@ -17,22 +17,21 @@ from tests.unit.inference.planning.made import (
     suspects,
 )
 from tirelib.core.errors import ParameterError
-from tirelib.inference.planning.criterion import NOTHING
 from tirelib.inference.planning.document import Plan, advice, plan_document
-from tirelib.inference.planning.next_test import gains, next_test
+from tirelib.inference.planning.next_test import NOTHING, gains, next_test
 from tirelib.inference.statistics.next_run import DRAWS
 
 
 def test_both_look_alikes_are_in_the_confidence_set() -> None:
     test = planned()
-    assert [rival.name for rival in test.trial.rivals] == [TWIN, PLANTED]
+    assert [rival.name for rival in test.rivals] == [TWIN, PLANTED]
     assert made().base.p <= 0.05
     (pair,) = test.pairs
     assert not pair.resolved
     # the second is planted: that the first is worse is a negative gap
     assert pair.gap < 0.0
     assert pair.better == PLANTED
-    assert test.trial.rivals[1].strength == pytest.approx([STRENGTH], rel=0.05)
+    assert test.rivals[1].strength == pytest.approx([STRENGTH], rel=0.05)
 
 
 def test_runs_are_ranked_and_the_slow_one_at_the_end_of_the_day_is_advised() -> None:
@@ -60,7 +59,7 @@ def test_the_advised_run_leaves_the_planted_effect_alone_in_the_set() -> None:
 
 def test_a_suspect_that_the_plan_cannot_show_is_left_out_with_the_reason() -> None:
     test = next_test(made(), suspects(PLANTED, "camber"), envelope())
-    assert test.trial.left_out == {"camber": "no run has a camber"}
+    assert test.left_out == {"camber": "no run has a camber"}
     assert not len(test.points)
     assert "fewer than two suspects" in advice(
         Plan(suspects(PLANTED, "camber"), test, {}, 20.0, "")
@@ -100,7 +99,7 @@ def test_repeats_of_the_plan_show_a_strong_effect_and_never_lower_the_chance() -
     alone = suspects(PLANTED)
     assert alone.with_nothing
     test = next_test(made(), alone, envelope())
-    assert [rival.name for rival in test.trial.rivals] == [PLANTED, NOTHING]
+    assert [rival.name for rival in test.rivals] == [PLANTED, NOTHING]
     by = list(gains(made(), alone, test)[PLANTED].values())
     assert (np.diff(by) >= -1e-9).all()
     assert by[0] > 0.9

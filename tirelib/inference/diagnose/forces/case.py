@@ -39,15 +39,12 @@ class ForceCase:
     ----------
     name : str
         Name of the campaign.
-    model : ForceModel
     problem : MeasuredForce
         At the points that are fitted.
     whole : MeasuredForce
         At all points, for which errors are reported.
     noise : float, [N] or [N m]
         Standard deviation of a point; NaN without repeats.
-    repeats : int
-    messages : tuple of str
     """
 
     name: str

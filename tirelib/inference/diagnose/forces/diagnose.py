@@ -26,7 +26,6 @@ class ForceDiagnosis:
     ----------
     models : ForceModels
         Everything that was fitted.
-    verdict : Verdict
     named : tuple of str
         Effects of the smallest members of the confidence set: of one member in the order of what
         each alone gains on held-out points, best first; one whose gain those before it have brought

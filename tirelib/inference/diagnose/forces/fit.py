@@ -30,7 +30,6 @@ class MeasuredForce:
 
     Attributes
     ----------
-    bench : ForceBench
     quantity : str
         Fy, Fx or Mz.
     measured : shape (n,), [N] or [N m]
@@ -86,7 +85,6 @@ class ForceFit:
     ----------
     values : mapping
         Parameters of the brush, SI.
-    effects : tuple of Effect
     strengths : tuple of array
         One array of components per effect.
     predicted : shape (n,)
@@ -137,7 +135,6 @@ def fit_force(
 
     Parameters
     ----------
-    problem : MeasuredForce
     values : mapping
         Start, and the parameters that stay.
     effects, strengths

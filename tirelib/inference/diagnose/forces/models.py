@@ -37,10 +37,8 @@ class ForceModels:
         What is fitted.
     given : ForceProblem
         The same force as the inference sees it, about the brush as its file has it.
-    false_alarm : float
     hypotheses : Hypotheses, optional
         About the given problem; made where they are asked for by default.
-    progress : callable, optional
     """
 
     def __init__(
