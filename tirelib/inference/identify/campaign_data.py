@@ -184,17 +184,13 @@ def straight_runs(waves: Waveforms) -> StraightRuns:
     _refuse_signs(chosen, strain)
     radius = chosen.header.tire.free_radius
     deflection = radius - chosen.conditions["loaded_radius"]
-    wrong = np.flatnonzero(
-        np.isfinite(deflection) & ((deflection <= 0) | (deflection > 0.3 * radius))
+    _refuse(
+        chosen,
+        np.isfinite(deflection) & ((deflection <= 0) | (deflection > 0.3 * radius)),
+        1e3 * chosen.conditions["loaded_radius"],
+        f"loaded radius {{:.1f}} mm with a free radius of {1e3 * radius:.1f} mm; it has to be "
+        "smaller, by less than 30 %; correct tire.free_radius_m or the channel",
     )
-    if wrong.size:
-        first = wrong[0]
-        raise CalibrationError(
-            f"{name}, run {chosen.run[first]}: loaded radius "
-            f"{1e3 * chosen.conditions['loaded_radius'][first]:.1f} mm with a free radius of "
-            f"{1e3 * radius:.1f} mm; it has to be smaller, by less than 30 %; correct "
-            "tire.free_radius_m or the channel"
-        )
     return StraightRuns(chosen, strain, gages, straight_noise(chosen, strain), deflection)
 
 
@@ -260,6 +256,15 @@ def _refuse_geometry(waves: Waveforms) -> None:
         )
 
 
+def _refuse(waves: Waveforms, wrong: BoolArray, value: FloatArray, words: str) -> None:
+    """Raise for the first run that is wrong, in words with the place of its value."""
+    if wrong.any():
+        first = int(np.argmax(wrong))
+        raise CalibrationError(
+            f"{waves.header.name}, run {waves.run[first]}: {words.format(value[first])}"
+        )
+
+
 def _refuse_conditions(waves: Waveforms) -> None:
     """Raise for the first run whose load, inflation pressure or turn rate no rolling ring has."""
     for name, least, unit, factor, words in (
@@ -268,29 +273,30 @@ def _refuse_conditions(waves: Waveforms) -> None:
         ("omega", 0.1, "rad/s", 1.0, "the channel or its unit"),
     ):
         value = waves.conditions[name]
-        wrong = np.flatnonzero(value < least)
-        if wrong.size:
-            raise CalibrationError(
-                f"{waves.header.name}, run {waves.run[wrong[0]]}: {name} is "
-                f"{factor * value[wrong[0]]:.4g} {unit}; at least {factor * least:g} {unit} is "
-                f"allowed for a rolling, inflated tire; correct {words}, or leave the run out"
-            )
+        _refuse(
+            waves,
+            value < least,
+            factor * value,
+            f"{name} is {{:.4g}} {unit}; at least {factor * least:g} {unit} is allowed for a "
+            f"rolling, inflated tire; correct {words}, or leave the run out",
+        )
 
 
 def _refuse_signs(waves: Waveforms, strain: FloatArray) -> None:
     """Raise for the first run whose innerliner is torn, or not stretched in the contact."""
     size = np.sqrt(np.mean(strain**2, axis=1))
-    huge = np.flatnonzero(size > MOST_STRAIN)
-    if huge.size:
-        raise CalibrationError(
-            f"{waves.header.name}, run {waves.run[huge[0]]}: {1e6 * size[huge[0]]:.3g} microstrain "
-            f"rms; at most {1e6 * MOST_STRAIN:.0f} is allowed; correct the unit of the gages"
-        )
+    _refuse(
+        waves,
+        size > MOST_STRAIN,
+        1e6 * size,
+        f"{{:.3g}} microstrain rms; at most {1e6 * MOST_STRAIN:.0f} is allowed; correct the unit "
+        "of the gages",
+    )
     middle = strain[:, np.abs(GRID) < MIDDLE].mean(axis=1)
-    wrong = np.flatnonzero(middle <= 0.0)
-    if wrong.size:
-        raise CalibrationError(
-            f"{waves.header.name}, run {waves.run[wrong[0]]}: {1e6 * middle[wrong[0]]:.0f} "
-            "microstrain below the axle, against the mean of the turn; the belt is bent flat "
-            "there and its inside stretched, tension is positive; correct the sign of the gages"
-        )
+    _refuse(
+        waves,
+        middle <= 0.0,
+        1e6 * middle,
+        "{:.0f} microstrain below the axle, against the mean of the turn; the belt is bent flat "
+        "there and its inside stretched, tension is positive; correct the sign of the gages",
+    )

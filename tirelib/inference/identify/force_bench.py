@@ -1,7 +1,7 @@
 """What a brush needs at fixed points, computed once: contact length of the ring, conditions."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -79,14 +79,13 @@ class ForceBench:
 
     def take(self, chosen: IntArray | BoolArray) -> "ForceBench":
         """Return the bench of some of the points, by index or mask."""
-        flat = self.ring_flatness
-        return ForceBench(
-            self.points.take(chosen),
-            self.conditions.take(chosen),
-            self.law,
-            None if self.half is None else self.half[chosen],
-            flat[chosen] if isinstance(flat, np.ndarray) else flat,
-            self.reference,
+        flat, half = self.ring_flatness, self.half
+        return replace(
+            self,
+            points=self.points.take(chosen),
+            conditions=self.conditions.take(chosen),
+            half=None if half is None else half[chosen],
+            ring_flatness=flat[chosen] if isinstance(flat, np.ndarray) else flat,
         )
 
 

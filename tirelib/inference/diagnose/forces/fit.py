@@ -1,7 +1,7 @@
 """The brush with some effects fitted to one force: parameters and strengths together."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -35,15 +35,12 @@ class MeasuredForce:
     measured : shape (n,), [N] or [N m]
     scale : float
         By which residuals are divided.
-    block : shape (n,)
-        Points whose errors may go together.
     """
 
     bench: ForceBench
     quantity: str
     measured: FloatArray
     scale: float
-    block: IntArray
 
     @classmethod
     def of(cls, bench: ForceBench, quantity: str, noise: float) -> "MeasuredForce":
@@ -51,20 +48,19 @@ class MeasuredForce:
         measured = getattr(bench.points.data, quantity)
         size = MISFIT * float(np.sqrt(np.mean(measured**2)))
         scale = float(np.hypot(size, noise if np.isfinite(noise) else 0.0))
-        return cls(bench, quantity, measured, max(scale, 1e-9), bench.points.data.block)
+        return cls(bench, quantity, measured, max(scale, 1e-9))
+
+    @property
+    def block(self) -> IntArray:
+        """Points whose errors may go together, (n,)."""
+        return self.bench.points.data.block
 
     def __len__(self) -> int:
         return int(self.measured.size)
 
     def take(self, chosen: IntArray | BoolArray) -> "MeasuredForce":
         """Return some of the points, with the same scale."""
-        return MeasuredForce(
-            self.bench.take(chosen),
-            self.quantity,
-            self.measured[chosen],
-            self.scale,
-            self.block[chosen],
-        )
+        return replace(self, bench=self.bench.take(chosen), measured=self.measured[chosen])
 
     def predict(self, values: Mapping[str, float], changes: Changes) -> FloatArray:
         """Return the force at the points."""
@@ -220,22 +216,17 @@ def with_effect(problem: MeasuredForce, model: ForceFit, effect: Effect) -> Forc
     TirelibError
         If neither settles.
     """
-    best: ForceFit | None = None
-    trouble: TirelibError | None = None
+    found, troubles = [], []
     for end in dict.fromkeys(room(problem, model.values, effect)):
         start = np.full(effect.components, START_SHARE * end)
+        both = [*model.effects, effect], [*model.strengths, start]
         try:
-            found = fit_force(
-                problem, model.values, [*model.effects, effect], [*model.strengths, start]
-            )
+            found.append(fit_force(problem, model.values, *both))
         except TirelibError as error:
-            trouble = error
-            continue
-        best = found if best is None or found.error < best.error else best
-    if best is None:
-        assert trouble is not None  # noqa: S101 - a start has failed
-        raise trouble
-    return best
+            troubles.append(error)
+    if not found:
+        raise troubles[-1]
+    return min(found, key=lambda fit: fit.error)
 
 
 def _covariance(rows: FloatArray, rest: FloatArray, block: IntArray) -> FloatArray:
@@ -243,8 +234,7 @@ def _covariance(rows: FloatArray, rest: FloatArray, block: IntArray) -> FloatArr
     p = len(rows)
     normal = rows @ rows.T + np.eye(p) / WIDTH**2
     inverse = np.linalg.inv(normal)
-    _, number = np.unique(block, return_inverse=True)
-    number = np.asarray(number).ravel()
+    number = np.asarray(np.unique(block, return_inverse=True)[1]).ravel()
     blocks = int(number.max()) + 1
     if blocks > 2 * p:
         score = np.stack([np.bincount(number, row * rest) for row in rows])
