@@ -28,7 +28,7 @@ from tirelib.inference.compare.model import TireModel
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.inference.identify.discrepancy import Discrepancy
 from tirelib.inference.identify.identify import estimate, prior_std, start_file
-from tirelib.inference.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
+from tirelib.inference.identify.waveform_fit import WaveformFit, fit_waveforms
 from tirelib.model.base import PLAIN, values_of
 from tirelib.model.solution import solved
 
@@ -91,9 +91,7 @@ def row(case: Case, without: Sequence[str], prior: Mapping[str, float]) -> Row:
     free = tuple(c for c in PLAIN if c.name not in without)
     std = [prior_std(start, c) * prior.get(c.name, 1.0) for c in free]
     values = values_of(start.tire) | dict.fromkeys(without, 0.0)
-    fit = fit_waveforms(
-        runs.data(), values, Prior(np.array(std)), free=free, discrepancy=Discrepancy()
-    )
+    fit = fit_waveforms(runs.data(), values, np.array(std), free=free, discrepancy=Discrepancy())
     true = dict(case.truth["numbers"])
     for name in ("k_u", "k_v"):  # of 2 bar
         true[name] += true[f"{name}_slope"] * (float(values["pressure"]) - 2e5)

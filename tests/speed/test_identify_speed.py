@@ -14,7 +14,7 @@ from tests.unit.inference.identify.model_waves import TIRE, made_waves
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.inference.identify.discrepancy import Discrepancy
 from tirelib.inference.identify.identify import estimated
-from tirelib.inference.identify.waveform_fit import Prior, fit_waveforms
+from tirelib.inference.identify.waveform_fit import fit_waveforms
 from tirelib.measured.signal import LowPass
 from tirelib.model.base import BARE, FREE, values_of
 from tirelib.model.solution import solved
@@ -57,7 +57,7 @@ def test_growth_with_free_parameters(capsys: pytest.CaptureFixture[str]) -> None
     runs = campaign(19)
     times = {}
     for free in (FREE[:1], FREE[:4], BARE):
-        prior = Prior(np.full(len(free), 0.5))
+        prior = np.full(len(free), 0.5)
         data = runs.data()
 
         def work(free=free, prior=prior, data=data) -> None:

@@ -7,25 +7,12 @@ later by an angle that goes with the speed. Left alone it is most of what a good
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.effects.harmonics import orders, with_gain
-from tirelib.effects.state import State
 from tirelib.inference.identify.random_effects import angle_slope
-from tirelib.model.chain import Change
 
 STD = 6e-5
 """Standard deviation of the delay, [s]: uniform to a sample at 10 kHz."""
 UNIT = 1e-4
 """Unit of the delay in slopes and coordinates, [s]."""
-
-
-def late(delay: float) -> tuple[str, Change]:
-    """Return the change of the chain by a delay [s]."""
-
-    def change(state: State) -> State:
-        angle = delay * np.asarray(state.conditions.omega)[:, None]
-        return with_gain(state, np.exp(-1j * orders(state) * angle))
-
-    return "gage", change
 
 
 def earlier(waveform: FloatArray, omega: FloatArray, delay: float) -> FloatArray:

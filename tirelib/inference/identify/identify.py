@@ -23,8 +23,8 @@ from tirelib.inference.identify.literature import OF_PLAIN, literature
 from tirelib.inference.identify.next_run import NextRun, next_run
 from tirelib.inference.identify.strain_notes import gage_notes, run_notes
 from tirelib.inference.identify.structure import STRUCTURE_STD, WITHOUT_SHEAR
-from tirelib.inference.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
-from tirelib.measured.waveforms import Waveforms, measure_waveforms
+from tirelib.inference.identify.waveform_fit import WaveformFit, fit_waveforms
+from tirelib.measured.waveforms import measure_waveforms
 from tirelib.model.base import Coordinate, coordinates, values_of
 
 WIDEST = 0.25
@@ -72,7 +72,6 @@ def identify(
     tire: TireFile | None = None,
     *,
     base: str = "plain",
-    waves: Waveforms | None = None,
     progress: Callable[[str], None] | None = None,
     found: Callable[[TireFile], None] | None = None,
 ) -> Identification:
@@ -84,8 +83,6 @@ def identify(
         Start and priors; the campaign's geometry and literature values where it is absent.
     base : str
         One of `BASES`.
-    waves : Waveforms, optional
-        Waveforms of the campaign, when they have been read already.
     found : callable, optional
         Called with the fitted tire before the intervals of its numbers are computed.
 
@@ -96,7 +93,7 @@ def identify(
     ConvergenceError
         If the fit does not settle.
     """
-    waves = waves or measure_waveforms(campaign, progress=progress)
+    waves = measure_waveforms(campaign, progress=progress)
     runs = straight_runs(waves)
 
     def tell(start: TireFile, values: Mapping[str, float | FloatArray]) -> None:
@@ -168,7 +165,7 @@ def estimated(
     fit = fit_waveforms(
         runs.data(),
         values,
-        Prior(np.array([prior_std(start, coordinate) for coordinate in free])),
+        np.array([prior_std(start, coordinate) for coordinate in free]),
         free=free,
         discrepancy=discrepancy,
         progress=progress,

@@ -26,7 +26,6 @@ from tirelib.inference.statistics.posterior import ROUGH, Posterior, posterior
 from tirelib.inference.statistics.problem import Point
 from tirelib.inference.statistics.quadratic import cost_of
 from tirelib.model.base import FREE, Coordinate, move
-from tirelib.model.chain import Changes
 from tirelib.model.solution import Solution
 
 SETTLED = 1e-3
@@ -39,13 +38,6 @@ SPREAD = {MISFIT: 1.0}
 """Variance of the coefficients of the structural misfit's rows."""
 PROBE = 2.0
 """Distance along a ridge at which the surface is compared with its parabola, in deviations."""
-
-
-@dataclass(frozen=True, slots=True)
-class Prior:
-    """Normal prior of the free coordinates, about the start values."""
-
-    std: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,10 +110,9 @@ class WaveformFit:
 def fit_waveforms(
     data: Data,
     start: Mapping[str, float | FloatArray],
-    prior: Prior,
+    std: FloatArray,
     *,
     free: tuple[Coordinate, ...] = FREE,
-    changes: Changes = (),
     discrepancy: Discrepancy | None = None,
     progress: Callable[[str], None] | None = None,
     found: Callable[[Mapping[str, float | FloatArray]], None] | None = None,
@@ -132,10 +123,8 @@ def fit_waveforms(
     ----------
     start : mapping
         Values of a tire, by name of `Tire`.
-    prior : Prior
-        Prior of `free`, about `start`.
-    changes : sequence of (stage, change)
-        Effects that the model has.
+    std : shape (n_free,)
+        Standard deviations of the coordinates' priors, which are normal, about the start.
     discrepancy : Discrepancy or None
         None leaves the structural misfit out: smallest residual, intervals of noise alone.
     found : callable, optional
@@ -146,7 +135,7 @@ def fit_waveforms(
     ConvergenceError
         If the steps do not settle; carries the last point.
     """
-    problem = WaveformProblem(data, start, prior.std, free, changes, discrepancy)
+    problem = WaveformProblem(data, start, std, free, discrepancy)
     few, steps = problem.thinned(), 0
 
     def step(label: str) -> None:

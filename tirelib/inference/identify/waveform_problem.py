@@ -21,7 +21,6 @@ from tirelib.inference.identify.whiten_runs import RunWhitening
 from tirelib.inference.statistics.problem import Point
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import Coordinate, move
-from tirelib.model.chain import Changes
 from tirelib.model.slopes import SolutionSlopes, slopes_of
 from tirelib.model.solution import Solution, solved
 from tirelib.physics.rolling.assemble import Unknowns
@@ -57,16 +56,8 @@ class WaveformSolved:
 class WaveformProblem:
     """Straight runs and the numbers of a tire, `tirelib.inference.statistics.problem.Model`.
 
-    Parameters
-    ----------
-    start : mapping
-        Values of a tire, by name of `Tire`.
-    std : shape (n_free,)
-        Standard deviations of the coordinates' priors, about the start.
-    changes : sequence of (stage, change)
-        Effects that the model has.
-    discrepancy : Discrepancy or None
-        None leaves the structural misfit out.
+    Values of a tire are the start, by name of `Tire`; `std` (n_free,) are the standard deviations
+    of the coordinates' priors about it. Without a discrepancy there is no structural misfit.
     """
 
     living: Sequence[Effect] = ()
@@ -78,10 +69,9 @@ class WaveformProblem:
         start: Mapping[str, float | FloatArray],
         std: FloatArray,
         free: tuple[Coordinate, ...],
-        changes: Changes = (),
         discrepancy: Discrepancy | None = None,
     ) -> None:
-        self.data, self.free, self.changes, self.discrepancy = data, free, changes, discrepancy
+        self.data, self.free, self.discrepancy = data, free, discrepancy
         self.values = dict(start)
         self.start = Point(np.zeros(len(free) + 1))
         self.widths = np.append(std, STD / UNIT)
@@ -135,7 +125,6 @@ class WaveformProblem:
         model = solved(
             move(self.values, point.base[:-1], self.free),
             data.points,
-            self.changes,
             low_pass=data.low_pass,
             start=start,
         )

@@ -14,13 +14,14 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
 from tirelib.effects.effect import Effect, effect
+from tirelib.effects.harmonics import orders, with_gain
 from tirelib.effects.state import State
 from tirelib.inference.compare.error import Yardstick, error_of
 from tirelib.inference.compare.model import model_of
 from tirelib.inference.diagnose.diagnose import plain_tires
 from tirelib.inference.diagnose.strain_models import Fitted
 from tirelib.inference.identify.campaign_data import StraightRuns
-from tirelib.inference.identify.delay import UNIT, by_delay, earlier, late
+from tirelib.inference.identify.delay import UNIT, by_delay, earlier
 from tirelib.inference.problems.strain import WIDTH, StrainProblem
 from tirelib.inference.statistics.posterior import Posterior, posterior
 from tirelib.inference.statistics.select import Hypotheses
@@ -56,10 +57,16 @@ def delay_std(model: Fitted) -> float:
     return UNIT * float(np.sqrt(model.covariance[k, k]))
 
 
+def late(state: State, delay: float) -> State:
+    """Return a state whose waveform comes later, as a gain of each order."""
+    angle = delay * np.asarray(state.conditions.omega)[:, None]
+    return with_gain(state, np.exp(-1j * orders(state) * angle))
+
+
 def late_runs(measured: StraightRuns, delay: float) -> StraightRuns:
     """Return runs as gages show them that are late."""
     state = State.of(values_of(TIRE), measured.data().points, GRID).but(waveform=measured.strain)
-    return replace(measured, strain=late(delay)[1](state).wave)
+    return replace(measured, strain=late(state, delay).wave)
 
 
 @pytest.fixture(scope="module")
@@ -192,7 +199,7 @@ def test_each_run_comes_later_by_its_speed() -> None:
     points = runs().data().points
     wave = np.cos(3.0 * GRID) + 0.2 * np.sin(7.0 * GRID)
     state = State.of(values_of(TIRE), points, GRID)
-    moved = late(DELAY)[1](state.but(waveform=np.tile(wave, (len(points), 1)))).wave
+    moved = late(state.but(waveform=np.tile(wave, (len(points), 1))), DELAY).wave
     angle = GRID - DELAY * np.asarray(points.omega)[:, None]
     np.testing.assert_allclose(moved, np.cos(3.0 * angle) + 0.2 * np.sin(7.0 * angle), atol=1e-12)
     assert np.ptp(points.omega) > 10.0, "speeds differ"

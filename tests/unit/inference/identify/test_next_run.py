@@ -11,7 +11,7 @@ from tirelib.inference.identify import next_run as module
 from tirelib.inference.identify.campaign_data import Data, straight_runs
 from tirelib.inference.identify.laboratory import SIDEWALL, TREAD, laboratory_tests
 from tirelib.inference.identify.next_run import NextRun, next_run
-from tirelib.inference.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
+from tirelib.inference.identify.waveform_fit import WaveformFit, fit_waveforms
 from tirelib.model.base import BARE, values_of
 
 NAMES = [c.name for c in BARE]
@@ -25,7 +25,7 @@ K_V, K_U_SLOPE, K_T, EI = (
     )
 )
 STRUCTURE = np.array([0.1, 0.03, 0.04, 0.2, 0.25, 0.2, 0.01, 0.06])
-PRIOR = Prior(np.array([0.5, 0.5, 1.0, 0.5, 1.0, 0.5, 0.1, 0.5]))
+PRIOR = np.array([0.5, 0.5, 1.0, 0.5, 1.0, 0.5, 0.1, 0.5])
 
 
 @pytest.fixture(scope="module")

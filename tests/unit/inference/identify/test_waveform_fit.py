@@ -18,7 +18,7 @@ from tirelib.inference.identify.campaign_data import Data, straight_runs
 from tirelib.inference.identify.delay import STD, UNIT, earlier
 from tirelib.inference.identify.discrepancy import Discrepancy
 from tirelib.inference.identify.identify import prior_std, start_file
-from tirelib.inference.identify.waveform_fit import Prior, WaveformFit, fit_waveforms
+from tirelib.inference.identify.waveform_fit import WaveformFit, fit_waveforms
 from tirelib.inference.identify.waveform_problem import MISFIT, WaveformProblem, WaveformSolved
 from tirelib.inference.identify.whiten_runs import RunWhitening
 from tirelib.inference.statistics import posterior
@@ -39,7 +39,7 @@ START = TIRE.changed(
     innerliner_offset=-0.0030,
     extension_stiffness=3.5e6,
 )
-WIDE = Prior(np.array([1.0, 1.0, 3.0, 1.0, 3.0, 1.0, 1.0, 1.0]))
+WIDE = np.array([1.0, 1.0, 3.0, 1.0, 3.0, 1.0, 1.0, 1.0])
 """So wide that it tells next to nothing."""
 
 
@@ -49,7 +49,7 @@ def data(seed: int = 0, **options: object) -> Data:
     return replace(straight_runs(waves).data(), noise=NOISE / np.sqrt(5.0))
 
 
-def plain(measured: Data, prior: Prior = WIDE) -> WaveformFit:
+def plain(measured: Data, prior: FloatArray = WIDE) -> WaveformFit:
     return fit_waveforms(measured, values_of(START), prior, free=BARE)
 
 
@@ -104,18 +104,18 @@ def test_without_noise_the_parameters_are_exact() -> None:
 
 def test_the_fit_does_not_depend_on_its_start(fitted: WaveformFit) -> None:
     near = fit_waveforms(
-        data(), values_of(TIRE), Prior(100.0 * WIDE.std), free=BARE
+        data(), values_of(TIRE), 100.0 * WIDE, free=BARE
     )  # the priors stand about the starts, so they have to tell nothing
-    far = plain(data(), Prior(100.0 * WIDE.std))
+    far = plain(data(), 100.0 * WIDE)
     deviation = np.sqrt(np.diag(fitted.covariance))
     # the last step's tolerance and the correction's three passes
     assert np.abs(errors(near) - errors(far)).max() < 0.3 * deviation.max()
 
 
 def test_a_narrow_prior_holds_its_parameter() -> None:
-    std = WIDE.std.copy()
+    std = WIDE.copy()
     std[0] = 1e-3
-    fit = plain(data(loads=LOADS[::2]), Prior(std))
+    fit = plain(data(loads=LOADS[::2]), std)
     assert float(fit.values["bending_stiffness"]) == pytest.approx(1.8, rel=3e-2)
     assert np.sqrt(fit.covariance[0, 0]) < 1.01e-3
 
@@ -162,7 +162,7 @@ def test_progress_is_told() -> None:
     fit = fit_waveforms(
         data(loads=LOADS[::2]),
         values_of(TIRE),
-        Prior(WIDE.std[:7]),
+        WIDE[:7],
         free=FREE,
         progress=said.append,
     )
@@ -308,7 +308,7 @@ def test_a_round_and_stiff_tread_is_not_taken_for_a_flat_and_soft_one(crown: flo
     )
     waves = made_waves(tire, noise=1e-5)
     start = start_file(waves.header, straight_runs(waves), None)
-    prior = Prior(np.array([prior_std(start, c) for c in PLAIN]))
+    prior = np.array([prior_std(start, c) for c in PLAIN])
     fit = fit_waveforms(
         straight_runs(waves).data(),
         values_of(start.tire),
