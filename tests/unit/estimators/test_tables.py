@@ -1,5 +1,7 @@
 """Results as pandas tables: they hold what the objects hold, in SI units."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,13 @@ def test_a_row_of_features_is_a_turn_and_a_gage(observed: Observations) -> None:
         observed.features.contact_angle.ravel(), nan_ok=True
     )
     assert table.attrs["units"]["contact_angle"] == "rad"
+
+
+def test_the_interval_of_a_number_is_that_of_its_file() -> None:
+    file = tirelib.read_tire("table-6-1")
+    number = replace(file.numbers["mass"], notes={"interval_SI": [3.0, 3.4]})
+    table = tirelib.parameter_table(replace(file, numbers={**file.numbers, "mass": number}))
+    assert table.loc["mass", ["low", "high"]].tolist() == [3.0, 3.4]
 
 
 def test_every_number_of_a_tire_has_its_si_unit() -> None:
