@@ -79,25 +79,15 @@ def guess_law(
 ) -> Guess | None:
     """Return a law for a residual, or None if no sparse one holds on left-out levels.
 
-    Parameters
-    ----------
-    rest : shape (n_runs, n_phi), [-]
-        Measured less model.
-    waveform : shape (n_runs, n_phi), [-]
-        Waveforms of the model.
-    edges : shape (n_runs, 2), [rad]
-        Edges of the contact.
-    turned : callable
-        Takes waveforms (..., n_runs, n_phi) to what structure and fit leave of them, whitened.
+    `rest` is measured less model and `waveform` the model's, (n_runs, n_phi), [-]; `edges` are
+    those of the contact, (n_runs, 2), [rad]; `turned` takes waveforms (..., n_runs, n_phi) to what
+    structure and fit leave of them, whitened.
     """
-    every, factors, terms = _library(waveform, points, edges)
-    columns = turned(terms)
-    response = turned(rest[None])[0]
+    names, powers, terms = _library(waveform, points, edges)
+    columns, response = turned(terms), turned(rest[None])[0]
     size = np.sqrt(np.sum(columns**2, axis=(1, 2)))
-    good = size > 1e-6 * size.max()
-    columns, names = columns[good], [n for n, g in zip(every, good, strict=True) if g]
-    powers = [p for p, g in zip(factors, good, strict=True) if g]
-    folds = _folds(points)
+    good = np.flatnonzero(size > 1e-6 * size.max())
+    columns, folds = columns[good], _folds(points)
     if not folds:
         return None
     chosen: list[int] = []
@@ -120,9 +110,10 @@ def guess_law(
     spread = np.sqrt(np.diag(inverse) * float(left @ left) / free)
     found = tuple(
         Term(names[k], powers[k], float(w), float(s))
-        for k, w, s in zip(chosen, weights, spread, strict=True)
+        for k, w, s in zip(good[chosen], weights, spread, strict=True)
     )
-    plain = [i for i, n in enumerate(every) if n in {t.shape for t in found} and not factors[i]]
+    shapes = {term.shape for term in found}
+    plain = [i for i, name in enumerate(names) if name in shapes and not powers[i]]
     return Guess(found, best, _exponents(found, terms[plain], points, response, turned))
 
 
@@ -189,23 +180,18 @@ def _library(
         for p in POWERS[a]
         for q in POWERS[b]
     ]
-    names, powers, rows = [], [], []
-    for name, shape in shapes.items():
-        centred = shape - shape.mean(axis=1, keepdims=True)
-        for factor in factors:
-            names.append(name)
-            powers.append(factor)
-            rows.append(centred * _factor(points, factor)[:, None])
-    return names, powers, np.array(rows)
+    rows = [
+        (shape - shape.mean(axis=1, keepdims=True)) * _factor(points, factor)[:, None]
+        for shape in shapes.values()
+        for factor in factors
+    ]
+    return [name for name in shapes for _ in factors], factors * len(shapes), np.array(rows)
 
 
 def _varied(points: Operating) -> list[str]:
-    found = []
-    for name in POWERS:
-        values = getattr(points, name)
-        if np.isfinite(values).all() and (values > 0).all() and levels(values).max() > 0:
-            found.append(name)
-    return found
+    values = {name: getattr(points, name) for name in POWERS}
+    known = {n: v for n, v in values.items() if np.isfinite(v).all() and (v > 0).all()}
+    return [name for name, value in known.items() if levels(value).max() > 0]
 
 
 def _factor(points: Operating, powers: Sequence[tuple[str, float]]) -> FloatArray:

@@ -132,10 +132,7 @@ class _State:
 def next_run(fit: WaveformFit, structure: FloatArray) -> NextRun:
     """Weigh runs inside a moderately extended envelope of the campaign, and laboratory tests.
 
-    Parameters
-    ----------
-    structure : shape (n_free,)
-        Structural standard deviation of each coordinate.
+    `structure` (n_free,) is the structural standard deviation of each coordinate.
     """
     state = _State.of(fit, structure)
     points, series = _candidates(fit.problem.data.points)
@@ -178,21 +175,15 @@ def _candidates(have: Operating) -> tuple[Operating, list[tuple[str, tuple[int, 
     grid = np.stack(np.meshgrid(speeds, pressures, loads, indexing="ij"), axis=-1)
     speed, pressure, load = grid.reshape(-1, 3).T
     n = load.size
-    fields = {
-        name: np.zeros(n)
-        for name in ("camber", "slip_angle", "slip_ratio", "side_force", "drive_force", "order")
+    warm = float(np.nanmean(have.temperature)) if np.isfinite(have.temperature).any() else np.nan
+    given = {
+        "load": load,
+        "pressure": pressure,
+        "speed": speed,
+        "omega": speed * float(np.nanmedian(have.omega / have.speed)),
+        "temperature": np.full(n, warm),
     }
-    points = Operating(
-        load=load,
-        pressure=pressure,
-        speed=speed,
-        omega=speed * float(np.nanmedian(have.omega / have.speed)),
-        temperature=np.full(
-            n,
-            float(np.nanmean(have.temperature)) if np.isfinite(have.temperature).any() else np.nan,
-        ),
-        **fields,
-    )
+    points = Operating(**(dict.fromkeys(Operating.__slots__, np.zeros(n)) | given))
     index = np.arange(n).reshape(grid.shape[:-1])
     sets: list[tuple[int, ...]] = [(i,) for i in range(n)]
     for plane in index:

@@ -1,7 +1,7 @@
 """The conditions that a rig allows, and a grid of possible runs in them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -218,9 +218,5 @@ def operating_at(wanted: FloatArray, present: Operating) -> Operating:
     n, (load, pressure, speed) = len(wanted), wanted.T
     rate = float(np.median(present.omega / present.speed))
     set_ = {"load": load, "pressure": pressure, "speed": speed, "omega": rate * speed}
-    others = {
-        field.name: np.full(n, float(np.mean(getattr(present, field.name))))
-        for field in fields(Operating)
-        if field.name not in set_
-    }
-    return Operating(**(others | set_ | {"order": np.ones(n)}))
+    mean = {k: np.full(n, float(np.mean(getattr(present, k)))) for k in Operating.__slots__}
+    return Operating(**(mean | set_ | {"order": np.ones(n)}))
