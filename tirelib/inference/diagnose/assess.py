@@ -16,7 +16,7 @@ from tirelib.inference.compare.model import TireModel
 from tirelib.inference.diagnose.diagnose import FALSE_ALARM, Diagnosis, Finding
 from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.diagnose.forces.diagnose import ForceDiagnosis, diagnose_force
-from tirelib.inference.diagnose.held_out import Fold
+from tirelib.inference.diagnose.held_out import NO_POINTS, NO_RUNS, Fold
 from tirelib.inference.diagnose.left import ForceLeft, Left, force_left, left_of, told_powers
 from tirelib.inference.diagnose.strain_models import Fitted, floor_of
 from tirelib.inference.problems.force_plan import varies
@@ -127,9 +127,7 @@ def assess(found: Diagnosis, given: TireModel) -> Assessment:
     before, refitted = models.least_error(found.base, given)
     after = final.reached if named else refitted
     if named and not chosen:
-        messages.append(
-            "nothing can be held out: three loads or two pressures, and four other runs, are needed"
-        )
+        messages.append(NO_RUNS)
     messages += [_too_large(f) for f in findings if f.effect.name in named and not f.in_range]
     return Assessment(
         diagnosis=found,
@@ -237,7 +235,7 @@ def assess_forces(
             "this campaign varies nothing with which an effect could show: see the dead effects"
         )
     if named and not any(fold.main for fold in found.models.folds):
-        messages.append("nothing can be held out: too few conditions vary")
+        messages.append(NO_POINTS)
     if named:
         messages += _instead(found) if verdict == "form_inadequate" else []
         messages += _in_order(case, [f.effect for f in findings if f.effect.name in named])

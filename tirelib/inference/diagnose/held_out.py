@@ -22,6 +22,8 @@ from tirelib.inference.identify.force_points import set_points
 from tirelib.inference.problems.force_plan import varies
 
 LEAST_LOADS, LEAST_PRESSURES = 3, 2
+NO_RUNS = "nothing can be held out: three loads or two pressures, and four other runs, are needed"
+NO_POINTS = "nothing can be held out: too few conditions vary"
 BLOCK = 11.0
 """Length of a held-out block of time, [s]."""
 PARTS = 4

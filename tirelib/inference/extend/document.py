@@ -9,6 +9,7 @@ from tirelib.core.parameters import TireFile
 from tirelib.inference.compare.error import named_errors
 from tirelib.inference.compare.forces import UNITS
 from tirelib.inference.diagnose.diagnose import strength_told
+from tirelib.inference.diagnose.held_out import NO_POINTS, NO_RUNS
 from tirelib.inference.extend.extension import Extension, ForceExtension
 
 FORMAT = "tirelib-extension/1"
@@ -78,12 +79,8 @@ def _force(done: ForceExtension) -> dict[str, Any]:
 
 
 def _strain_messages(done: Extension) -> list[str]:
-    messages = [] if done.given.known else [NO_REPEATS]
-    if not done.folds:
-        messages.append(
-            "nothing can be held out: three loads or two pressures, and four other runs, are needed"
-        )
-    return messages
+    known = [] if done.given.known else [NO_REPEATS]
+    return known if done.folds else [*known, NO_RUNS]
 
 
 def _force_messages(done: ForceExtension) -> list[str]:
@@ -94,7 +91,7 @@ def _force_messages(done: ForceExtension) -> list[str]:
             "repeat some runs"
         )
     if not any(fold.main for fold in done.folds):
-        messages.append("nothing can be held out: too few conditions vary")
+        messages.append(NO_POINTS)
     return messages
 
 

@@ -64,10 +64,8 @@ def half_lengths(tire: Tire, vertical_load: FloatArray, pressure: FloatArray) ->
         low, high = 0.999 * high, 1.001 * high
     side = np.linspace(loads.min(), loads.max() * (1.0 + 1e-9) + 1e-3, _GRID[0])
     across = np.linspace(low, high, _GRID[1])
-    f, p = (x.ravel() for x in np.meshgrid(side, across, indexing="ij"))
-    surface = RectBivariateSpline(
-        side, across, _half(tire, ring_contact(tire, f, p)).reshape(_GRID)
-    )
+    contact = ring_contact(tire, np.repeat(side, _GRID[1]), np.tile(across, _GRID[0]))
+    surface = RectBivariateSpline(side, across, _half(tire, contact).reshape(_GRID))
     return np.asarray(surface.ev(loads, np.clip(pressures, low, high)), dtype=np.float64)
 
 
