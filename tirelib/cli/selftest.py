@@ -82,7 +82,7 @@ def selftest(
     from tirelib.inference.compare.model import model_of
     from tirelib.inference.identify.campaign_data import straight_runs
     from tirelib.inference.planning.selftest import selftest as test_plan
-    from tirelib.inference.planning.selftest_document import selftest_document
+    from tirelib.inference.planning.selftest import selftest_document
     from tirelib.measured.waveforms import measure_waveforms
     from tirelib.model.registration import registered_effects
 

@@ -6,8 +6,7 @@ from tests.unit.inference.diagnose.planted import runs
 from tests.unit.inference.identify.model_waves import TIRE
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
-from tirelib.inference.planning.selftest import Planting, SelfTest, selftest
-from tirelib.inference.planning.selftest_document import selftest_document
+from tirelib.inference.planning.selftest import Planting, SelfTest, selftest, selftest_document
 from tirelib.model.base import values_of
 
 REPEATS = 6
