@@ -243,10 +243,7 @@ def _told(cells: Cells, load: float) -> ForceMisfit:
 
 
 def _joined(at: CellConditions, terms: Sequence[Term]) -> CellConditions:
-    more = (
-        np.array([term.place for term in terms])
-        .reshape(len(terms), len(CellConditions.__slots__))
-        .T
-    )
-    pairs = zip(CellConditions.__slots__, more, strict=True)
-    return CellConditions(*(np.concatenate([getattr(at, name), column]) for name, column in pairs))
+    names = CellConditions.__slots__
+    more = np.array([term.place for term in terms]).reshape(len(terms), len(names)).T
+    here = [getattr(at, name) for name in names]
+    return CellConditions(*map(np.concatenate, zip(here, more, strict=True)))
