@@ -10,6 +10,7 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.quantities import QUANTITIES
 from tirelib.inference.planning.document import PROMISING, STRUCTURE, Plan, advice, plan_document
 from tirelib.inference.planning.envelope import AXES
+from tirelib.inference.planning.next_test import NOTHING, NextTest, PairForecast
 from tirelib.report.figures.compare_plot import Plot, dots, line, styled_figure
 from tirelib.report.page import Part, Table, number, numbers, write_parts_page
 from tirelib.report.style import BLUE, FAINT, RED
