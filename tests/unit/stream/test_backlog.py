@@ -14,7 +14,7 @@ from tests.synthetic import frames as cut
 from tirelib.core.flags import TurnFlag
 from tirelib.core.held import HELD
 from tirelib.measured.signal.turns import TurnCutter
-from tirelib.stream.backlog import MOST_SAMPLES, quiet_range
+from tirelib.stream.backlog import quiet_range
 from tirelib.stream.reference import NumpyEstimator
 
 TURN = int(2.0 * np.pi * live.RADIUS / live.SPEED * live.RATE)
@@ -89,7 +89,16 @@ def test_most_of_a_turn_waits_and_never_more_than_a_bound(monkeypatch: pytest.Mo
     for first in range(0, rest.shape[1], 10):
         estimator.take(rest[:, first : first + 10].T.ravel().tolist(), [*held(0).values()])
     assert len(calls) < 0.35 * rest.shape[1] / 10
-    assert 100 < max(calls) <= MOST_SAMPLES
+    assert 100 < max(calls) <= 512
+
+
+def test_a_slow_wheel_waits_for_no_more_samples_than_the_bound() -> None:
+    estimator = NumpyEstimator(live.calibration(), live.RATE)
+    strain = live.strain_of(4e3, 0.05, turns=3.0, speed=4.5)[0]
+    estimator.push(strain, **held(1))
+    found = quiet_range(vars(estimator)["_cutter"])
+    assert found is not None
+    assert 500 < found[2] <= 512
 
 
 def test_a_standing_wheel_is_seen_at_once() -> None:

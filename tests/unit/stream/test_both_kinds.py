@@ -72,10 +72,19 @@ def test_a_gage_that_lives_may_lack_the_road_and_one_that_shows_nothing_is_out(k
 
 
 @KINDS
-def test_without_a_speed_the_rest_is_valid_and_the_whole_is_not(kind: Kind) -> None:
-    estimator = played(kind, speed=np.nan)
-    assert estimator.is_valid("Fz")
-    assert not estimator.valid
+@pytest.mark.parametrize("calibrated", [True, False])
+def test_without_a_speed_the_rest_is_valid_and_the_whole_is_not(
+    kind: Kind, calibrated: bool
+) -> None:
+    """Also where the slip ratio, which needs it, is not calibrated."""
+    known = live.calibration()
+    if not calibrated:
+        known = replace(known, chains={k: replace(c, radius=None) for k, c in known.chains.items()})
+    for speed, valid in ((live.SPEED, True), (np.nan, False)):
+        estimator = kind(known, live.RATE)
+        estimator.push(strain(), **(HELD | {"speed": speed}))
+        assert estimator.is_valid("Fz")
+        assert estimator.valid == valid
 
 
 @KINDS
