@@ -101,6 +101,22 @@ def test_a_slow_wheel_waits_for_no_more_samples_than_the_bound() -> None:
     assert 500 < found[2] <= 512
 
 
+def test_samples_wait_no_longer_than_the_finder_has_patience() -> None:
+    """Two and a half turns after a contact it starts anew, with levels that are not known yet."""
+    estimator = NumpyEstimator(live.calibration(), live.RATE)
+    strain = live.strain_of(4e3, 0.05, turns=3.0)[0]
+    estimator.push(strain, **held(1))
+    rooms = []
+    for _ in range(4 * TURN // 10):
+        estimator.push(np.repeat(strain[:, -1:], 10, axis=1), **held(1))
+        cutter = vars(estimator)["_cutter"]
+        if (found := quiet_range(cutter)) is not None:
+            rooms.append((found[2], vars(cutter)["_finder"]._room()))
+    waits, patience = np.array(rooms).T
+    assert (waits <= np.maximum(patience - 3, 0)).all()
+    assert patience.min() < 20
+
+
 def test_a_standing_wheel_is_seen_at_once() -> None:
     estimator = NumpyEstimator(live.calibration(), live.RATE)
     estimator.push(live.strain_of(4e3, 0.05, turns=3.0)[0], **held(1))
