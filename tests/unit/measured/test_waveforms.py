@@ -93,6 +93,19 @@ def test_conditions_are_measured_or_set(waves: Waveforms) -> None:
     assert waves.start == pytest.approx(12.0 * np.arange(5))
 
 
+@pytest.mark.parametrize(
+    ("name", "most"),
+    [("slip_angle", np.deg2rad(0.25)), ("camber", np.deg2rad(0.25)), ("slip_ratio", 0.005)],
+)
+def test_a_run_is_straight_up_to_a_quarter_degree_and_half_a_percent(
+    waves: Waveforms, name: str, most: float
+) -> None:
+    values = most * np.array([0.0, np.nan, 0.99, 1.01, -1.01])
+    still = dict.fromkeys(("slip_angle", "camber", "slip_ratio"), np.zeros(5))
+    given = replace(waves, conditions=dict(waves.conditions) | still | {name: values})
+    assert given.straight.tolist() == [True, True, True, False, False]
+
+
 def test_scatter_of_turns_is_the_noise(waves: Waveforms) -> None:
     assert (waves.scatter > 5e-7).all()
     assert (waves.scatter < 3e-5).all()

@@ -1,5 +1,6 @@
 """Laws of the features: edges where the waveform is steepest, symmetry, scaling, vectorisation."""
 
+from collections.abc import Callable
 from dataclasses import fields
 
 import numpy as np
@@ -10,9 +11,10 @@ from hypothesis import strategies as st
 from tests.synthetic import LATERAL, RATE, record
 from tirelib.core.flags import TurnFlag
 from tirelib.measured.features import Features, concatenate_features, extract_features
+from tirelib.measured.features.extract import reference_features
 from tirelib.measured.features.peaks import peak
 from tirelib.measured.features.table import feature_frame, rate_slope, units
-from tirelib.measured.signal import cut_turns
+from tirelib.measured.signal import Turns, cut_turns
 
 
 def features_of(*, speed: float = 18.0, **options: float) -> Features:
@@ -96,14 +98,15 @@ def test_integral_over_the_contact_converges_to_the_exact_one() -> None:
     assert (found.e_vertical[1:] < exact).all()
 
 
-def test_integrals_of_polynomials_are_exact() -> None:
+@pytest.mark.parametrize("extract", [extract_features, reference_features])
+def test_integrals_of_polynomials_are_exact(extract: Callable[[Turns], Features]) -> None:
     """A constant and a straight line, between edges that lie off the grid."""
     strain, _, _ = record(turns=3)
     turns = cut_turns(strain, RATE, LATERAL)
     phi = turns.trace.phi
-    flat = extract_features(turns)
+    flat = extract(turns)
     turns.trace.strain[:] = 2.0 + 3.0 * phi
-    found = extract_features(turns)
+    found = extract(turns)
     length, middle = flat.contact_angle[1:], 0.5 * (flat.lead + flat.trail)[1:]
     level = 2.0 + 3.0 * middle
     np.testing.assert_allclose(found.e_vertical[1:], level * length, rtol=1e-9)
