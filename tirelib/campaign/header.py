@@ -25,7 +25,7 @@ _LATERAL_RANGE = (-0.5, 0.5)
 _RATE_RANGE = (1.0, 1e7)
 _TOLERANCE_RANGE = (0.0, 0.5)
 _KNOWN: Mapping[str, frozenset[str]] = {
-    "": frozenset({"format", "name", "axes", "tire", "gages", "tolerance", "rig"}),
+    "": frozenset({"format", "tirelib", "name", "axes", "tire", "gages", "tolerance", "rig"}),
     "tire": frozenset({"name", *_TIRE_RANGE}),
     "gages": frozenset({"lateral_m", "rate_hz", "unit"}),
     "tolerance": frozenset({"load", "pressure", "speed", "gain"}),

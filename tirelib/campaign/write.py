@@ -13,6 +13,7 @@ from tirelib.campaign import plan as plan_file
 from tirelib.campaign.mdf import Channel, Group, write_mdf
 from tirelib.campaign.model import CampaignHeader, FloatArray, Run, RunPlan
 from tirelib.core.axes import sign
+from tirelib.core.documents import stamped
 from tirelib.core.errors import ParameterError, ShapeError
 from tirelib.core.units import dimension_of, from_si
 
@@ -78,7 +79,7 @@ def write_campaign(
         write_mdf(folder / plan.file, _groups(run, header))
         plans.append(plan)
     plan_file.write_plans(folder / plan_file.FILE, plans, header.axes)
-    text = tomli_w.dumps(header_file.header_document(header))
+    text = tomli_w.dumps(stamped(header_file.header_document(header)))
     (folder / header_file.FILE).write_text(text, encoding="utf-8")
 
 

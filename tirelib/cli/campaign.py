@@ -1,6 +1,5 @@
 """``tirelib campaign``: checks a folder of measurements, and shows its content."""
 
-import json
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,7 +14,7 @@ from rich.table import Table
 from tirelib.campaign.model import Run
 from tirelib.campaign.problem import Problem
 from tirelib.campaign.read import Campaign, read_campaign
-from tirelib.cli.common import NEW_FILE, NEW_FOLDER
+from tirelib.cli.common import NEW_FILE, NEW_FOLDER, write_json
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.core.errors import CalibrationError, FormatError
@@ -67,7 +66,7 @@ def check(context: click.Context, folder: Path, json_file: Path | None) -> None:
     errors = sum(problem.severity == "error" for problem in problems)
     _print_problems(folder, problems, errors)
     if json_file is not None:
-        _write_json(json_file, check_document(folder, problems))
+        write_json(json_file, check_document(folder, problems))
     context.exit(1 if errors else 0)
 
 
@@ -174,7 +173,7 @@ def show(
         picture = save_figure(overview_figure(data.header, rows, drawn), target / "overview.png")
         console.print(f"overview plot: {picture}", markup=False, soft_wrap=True)
     if json_file is not None:
-        _write_json(json_file, _show_document(data, rows, picture))
+        write_json(json_file, _show_document(data, rows, picture))
 
 
 def _write_measured(data: Campaign, runs: Iterator[Run], file: Path) -> None:
@@ -231,8 +230,3 @@ def _show_document(data: Campaign, rows: list[Any], picture: Path | None) -> dic
         "runs": [row_document(row) for row in rows],
         "plot": None if picture is None else str(picture),
     }
-
-
-def _write_json(file: Path, document: dict[str, Any]) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -17,6 +17,7 @@ from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.core.documents import new_file
 from tirelib.core.errors import FormatError
 from tirelib.core.flags import TurnFlag
+from tirelib.core.version import __version__
 from tirelib.measured.observations import Observations, observe
 from tirelib.measured.signal import LowPass
 
@@ -60,6 +61,7 @@ def features(
             [campaign], low_pass=make_low_pass(order, cut_off), progress=progress
         )
     table = feature_frame(observations.features, run=observations.run)
+    table.attrs["tirelib"] = __version__  # a Parquet file keeps it
     with new_file(target):
         if target.suffix == ".csv":
             table.to_csv(target, index=False)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tirelib.core.errors import FormatError
+from tirelib.core.version import __version__
 
 
 @contextmanager
@@ -31,7 +32,7 @@ def new_file(path: Path) -> Iterator[Path]:
 
 
 def write_json(path: Path, document: dict[str, Any]) -> None:
-    """Write JSON; NaN and infinity become null.
+    """Write JSON with the version of tirelib; NaN and infinity become null.
 
     Raises
     ------
@@ -39,7 +40,13 @@ def write_json(path: Path, document: dict[str, Any]) -> None:
         If the file cannot be written.
     """
     with new_file(path):
-        path.write_text(json.dumps(plain(document), indent=1, allow_nan=False) + "\n")
+        path.write_text(json.dumps(plain(stamped(document)), indent=1, allow_nan=False) + "\n")
+
+
+def stamped(document: dict[str, Any]) -> dict[str, Any]:
+    """Return a document with the version that writes it, behind its format."""
+    head = {key: document[key] for key in ("format",) if key in document}
+    return {**head, "tirelib": __version__, **document}
 
 
 def plain(value: Any) -> Any:

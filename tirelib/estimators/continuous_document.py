@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tirelib.campaign.recording import Recording
-from tirelib.core.documents import new_file, plain
+from tirelib.core.documents import new_file, plain, stamped
 from tirelib.core.flags import flag_names
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.continuous import WheelTurns
@@ -143,6 +143,6 @@ class TurnsInJson:
 
     def end(self, head: dict[str, Any]) -> None:
         """Write the rest of the document."""
-        text = json.dumps(plain(head), indent=1, allow_nan=False)
+        text = json.dumps(plain(stamped(head)), indent=1, allow_nan=False)
         self._file.write("\n],\n" + text.lstrip("{").lstrip())
         self._file.write("\n")

@@ -18,6 +18,8 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+from tirelib.core.version import __version__
+
 AXES_NAME = "ISO 8855"
 """Axis system of every plot and page."""
 INK, FAINT, RULE = "#1c2530", "#5d6b7a", "#d5dbe1"
@@ -55,6 +57,7 @@ STYLE: dict[Any, Any] = {
     "svg.fonttype": "path",
 }
 AGREEMENT = "estimated = measured"
+_WRITER = f"tirelib {__version__}"
 RESOLUTION = 110
 """Dots per inch of PNG files."""
 
@@ -153,10 +156,12 @@ def save(figure: Figure, folder: Path, name: str) -> str:
     canvas, engine, dots = figure.canvas, figure.get_layout_engine(), figure.dpi
     with mpl.rc_context(STYLE):
         figure.dpi = RESOLUTION
-        FigureCanvasAgg(figure).print_png(folder / f"{name}.png")
+        FigureCanvasAgg(figure).print_png(folder / f"{name}.png", metadata={"Software": _WRITER})
         figure.dpi = dots  # of what an SVG file holds as pixels
         figure.set_layout_engine("none")  # the places are found; do not look for them twice
-        FigureCanvasSVG(figure).print_svg(folder / f"{name}.svg", metadata={"Date": None})
+        FigureCanvasSVG(figure).print_svg(
+            folder / f"{name}.svg", metadata={"Date": None, "Creator": _WRITER}
+        )
         figure.set_layout_engine(engine)
     figure.dpi = dots
     figure.set_canvas(canvas)

@@ -16,6 +16,7 @@ from tirebench.wire.conditions import RunMark
 from tirebench.wire.line_counts import LineCounts
 from tirebench.wire.timeline import TimelineCounts
 from tirelib.core.flags import flag_names
+from tirelib.core.version import __version__
 from tirelib.estimators.edge import EDGE_UNIT, FORMAT, VARIED
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ def document(
     chain = None if calibration is None else calibration.chains[-1]
     return {
         "format": FORMAT,
+        "tirelib": __version__,
         "axes": "iso",
         "tire": None if calibration is None else calibration.tire,
         "summary": {

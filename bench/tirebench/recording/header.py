@@ -15,6 +15,7 @@ from typing import Any
 
 from tirebench.errors import RecordingError
 from tirebench.protocols import SERIAL
+from tirelib.core.version import __version__
 
 FORMAT, FORMER = "tirebench-recording/2", "tirebench-recording/1"
 LATEST = 2**63
@@ -78,6 +79,7 @@ class RecordingHeader:
         """Return the header as MCAP metadata."""
         return {
             "format": self.format,
+            "tirelib": __version__,
             "settings": json.dumps(self.settings),
             "device": self.device,
             "fmu_sha256": self.fmu,

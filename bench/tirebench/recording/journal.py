@@ -16,6 +16,7 @@ from tirebench.estimator.chain import Turn
 from tirebench.recording.document import QUANTITIES, empty_summary, turn_document
 from tirebench.recording.new_file import keep_recordings
 from tirelib.core.documents import plain
+from tirelib.core.version import __version__
 from tirelib.estimators.edge import FORMAT
 
 HEAD = f'{{"format": "{FORMAT}", "axes": "iso", "turns": [\n'
@@ -142,6 +143,7 @@ def completed(text: str) -> dict[str, Any] | None:
             break
     return {
         "format": FORMAT,
+        "tirelib": __version__,
         "axes": "iso",
         "summary": {name: empty_summary(name) for name in QUANTITIES},
         "turns": turns,

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from tirelib.core.documents import stamped
 from tirelib.core.errors import FormatError, ParameterError, UnitError
 from tirelib.core.parameters.tire import (
     FIELDS,
@@ -164,7 +165,7 @@ def read_tire(name: str | Path) -> TireFile:
             faults.append(str(error).removeprefix("tire: "))
     if faults:
         raise FormatError([f"{path}: {fault}" for fault in faults])
-    extra = {k: v for k, v in document.items() if k not in {*_GROUPS, "format", "name"}}
+    extra = {k: v for k, v in document.items() if k not in {*_GROUPS, "format", "tirelib", "name"}}
     return TireFile(str(document.get("name", path.stem)), numbers, extra)
 
 
@@ -251,7 +252,7 @@ def write_tire(file: TireFile, path: str | Path, file_format: str = FORMAT) -> N
     """Write a tire, each number in its unit of `NUMBERS`; it reads back to a relative 3e-16."""
     import tomli_w
 
-    document: dict[str, Any] = {"format": file_format, "name": file.name}
+    document: dict[str, Any] = stamped({"format": file_format, "name": file.name})
     for name, entry in NUMBERS.items():
         number = file.numbers.get(name)
         if number is None:
