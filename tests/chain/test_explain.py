@@ -20,6 +20,7 @@ from tirelib.measured import waveforms
 
 KEYS = {
     "format",
+    "tirelib",
     "campaign",
     "quantity",
     "verdict",
