@@ -161,8 +161,8 @@ def _without_gaps(
         raise FormatError(
             Fault(
                 "time of the gages",
-                f"not uniform: a step of {1e3 * steps[first]:.3g} ms at {time[first]:.4f} s, usual "
-                f"are {1e3 * period:.3g} ms",
+                f"not uniform: a step of {1e3 * steps[first]:.3g} ms at {time[first]:.4f} s, the "
+                f"usual step is {1e3 * period:.3g} ms",
                 "uniform steps are needed, gaps are allowed",
                 "export it with the logger's own clock",
             )

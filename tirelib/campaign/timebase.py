@@ -57,7 +57,7 @@ def gage_time_problems(file: str, times: FloatArray, rate: float) -> list[Proble
             Problem(
                 where,
                 f"not uniform: a step of {1e3 * steps[first]:.3g} ms after sample {first} "
-                f"(t = {times[first]:.4f} s), usual are {1e3 * usual:.3g} ms",
+                f"(t = {times[first]:.4f} s), the usual step is {1e3 * usual:.3g} ms",
                 "uniform steps are needed",
                 "export it with the logger's own clock",
             )

@@ -196,7 +196,7 @@ def build(
     if samples_per_step == 1:
         console.print(
             "one sample a step: behind a VirtualTire.fmu or a transmitter build with its number of "
-            "samples (--samples-per-step; `tirelib fmu virtual` takes 10 unless told otherwise)"
+            "samples (--samples-per-step; `tirelib fmu virtual` takes 10 by default)"
         )
     console.print(f"written: {path} ({path.stat().st_size / 1e3:.0f} kB)")
     console.print(f"next: {shlex.join(['tirelib', 'fmu', 'check', str(path)])}")

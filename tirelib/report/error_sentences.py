@@ -76,7 +76,7 @@ def unmoved(told: Mapping[str, Any]) -> list[str]:
         folds
     ):
         return [
-            f"No error on the {runs_or_points(told)} held out fell, in none of {len(folds)} parts: "
+            f"The error on the {runs_or_points(told)} held out fell in none of {len(folds)} parts: "
             f"{said_error(before)} before, {said_error(after)} after, on average."
         ]
     pairs += [

@@ -308,8 +308,9 @@ def _joined(parameters: Sequence[Mapping[str, Any]]) -> Part:
     rows = [{**each, **row} for each in parameters for row in each["joined"]]
     rows.sort(key=lambda row: -round(row["gain"], 2))
     note = (
-        "gain: standard deviation alone over that after the join; its square is how many times the "
-        "runs it is worth. Tires that stand out are not joined."
+        "Gain: the standard deviation of the tire alone divided by that after joining. Its square "
+        "is how many times as many runs the tire alone would need. Tires that stand out are not "
+        "joined."
     )
     table = Table.of(
         "Joined numbers",

@@ -276,7 +276,7 @@ def test_the_worst_held_out_part_is_named_and_a_useless_effect_is_told_once() ->
     )
     same = [fold("cell", 9.0, 9.0)] * 4
     assert unmoved(diagnosis(heldout_error_after=25.9, held_out=same)) == [
-        "No error on the runs held out fell, in none of 4 parts: 25.9 before, 25.9 after, on "
+        "The error on the runs held out fell in none of 4 parts: 25.9 before, 25.9 after, on "
         "average."
     ]
 

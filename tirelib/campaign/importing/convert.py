@@ -234,7 +234,7 @@ class _Conversion(MappedTable):
             (
                 np.append(False, steps < 0.0),
                 "the time decreases",
-                'backward_time = "drop" or, for segments on end, "join"',
+                'backward_time = "drop" or, for segments that follow each other, "join"',
             ),
         ):
             if wrong.any():

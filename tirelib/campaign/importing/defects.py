@@ -138,7 +138,7 @@ def _missing(
                 "missing",
                 choice,
                 holes,
-                f"numbers of column {name!r} were interpolated in time, up to {longest} on end",
+                f"numbers of column {name!r} were interpolated in time, up to {longest} in a row",
             )
         )
     if lost[clock].any():

@@ -362,7 +362,7 @@ def _guessed_axes(table: Table, known: Mapping[str, ColumnSummary]) -> tuple[str
     if load is None:
         return (
             "",
-            "required: iso, sae or adapted_sae; no column is known as Fz, whose sign tells",
+            "required: iso, sae or adapted_sae; no column is known as Fz, whose sign would show it",
         )
     if float(np.nanmedian(load)) < 0.0:
         return "sae", "a guess: Fz is negative; check it"

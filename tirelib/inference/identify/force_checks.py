@@ -55,8 +55,8 @@ def refuse_wrong_forces(data: ForceData, forces: tuple[str, ...]) -> None:
         if np.ptp(share) < DEAD:
             raise CalibrationError(
                 f"brush fit: {name} over Fz stays within {np.ptp(share):.1g} over {known.sum()} "
-                f"points while the {words} varies; {DEAD:g} is the least; the channel is dead or "
-                "its unit wrong; mend or leave out the channel"
+                f"points while the {words} varies; at least {DEAD:g} is expected; the channel is "
+                "dead or its unit wrong; mend or leave out the channel"
             )
         together = sign * _correlation(share, slip[known])
         if together < -WRONG:

@@ -78,7 +78,7 @@ def noise_note(name: str, noise: float, size: float) -> tuple[str, ...]:
         f"the noise from repeats, {noise:.3g} {QUANTITIES[name].unit}, is {100 * noise / size:.0f} "
         f"% of the rms of {name}; a rig repeats to {100 * NOISY:.0f} % or better: these repeats "
         "differ in something that is not recorded or not mapped (camber, temperature, wear, "
-        "another tire), so no effect is told reliably",
+        "another tire), so no effect can be named reliably",
     )
 
 

@@ -111,7 +111,7 @@ class Envelope:
         Raises
         ------
         ParameterError
-            If a range is not in order or not positive; the campaign does not tell its speeds or
+            If a range is not in order or not positive; the campaign does not state its speeds or
             another condition; or a range is given that is no axis of these runs.
         """
         given = {name: ends for name, ends in declared.items() if ends is not None}
@@ -197,13 +197,13 @@ def _campaigns(points: Any, name: str) -> Range:
     axis, values = AXES[name], np.asarray(getattr(points, name))
     if name == "speed" and not (np.isfinite(values) & (values > 0.0)).all():
         raise ParameterError(
-            "envelope: the campaign does not tell its speed in every run, so no run at another "
+            "envelope: the campaign does not state its speed in every run, so no run at another "
             "speed can be predicted; give speed_kmh in runs.csv"
         )
     if not np.isfinite(values).all() or (axis.positive and not (values > 0.0).all()):
         raise ParameterError(
-            f"envelope: the campaign does not tell its {axis.quantity.title} in every run; declare "
-            f"the range with --{name.replace('_', '-')}-range"
+            f"envelope: the campaign does not state its {axis.quantity.title} in every run; "
+            f"declare the range with --{name.replace('_', '-')}-range"
         )
     low, high = float(values.min()), float(values.max())
     return low * (1.0 - axis.wider), high * (1.0 + axis.wider)

@@ -90,6 +90,6 @@ def test_a_noise_of_another_condition_is_told_from_that_of_a_rig() -> None:
     assert noise_note("Fy", 207.0, 3450.0) == (
         "the noise from repeats, 207 N, is 6 % of the rms of Fy; a rig repeats to 3 % or better: "
         "these repeats differ in something that is not recorded or not mapped (camber, "
-        "temperature, wear, another tire), so no effect is told reliably",
+        "temperature, wear, another tire), so no effect can be named reliably",
     )
     assert noise_note("Fy", 13.0, 3450.0) == noise_note("Fy", np.nan, 3450.0) == ()
