@@ -98,7 +98,7 @@ def calibrate(
     runs = sum(len(campaign.plans) for campaign in campaigns)
     with progress_bar("reading", runs) as progress:
         observations = observe(campaigns, low_pass=low_pass, progress=progress)
-    with progress_bar("fitting", 5 * 4) as progress:
+    with progress_bar("fitting") as progress:  # how many fits depends on the data
         trained = train(observations, low_pass=low_pass, progress=progress)
     held_out: tuple[HeldOut, ...] = ()
     if not quick:
