@@ -2,19 +2,24 @@
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
+from io import StringIO
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from tests.bench.campaigns import tiny_runs
 from tests.bench.clocks import Clock
-from tests.bench.in_process import InProcess
+from tests.bench.in_process import FakeSource, InProcess
 from tests.bench.test_page import block
 from tests.bench.test_page import turn as made_turn
+from tirebench.cli.run_session import print_summary
 from tirebench.deadline import Deadline
 from tirebench.emulator.emulator import write_script
 from tirebench.emulator.faults import Faults
 from tirebench.estimator.chain import Outputs, Turn
+from tirebench.estimator.dead_gages import DeadGages
 from tirebench.estimator.estimation import News, WheelEstimation
 from tirebench.estimator.session import Limits, Session
 from tirebench.estimator.wheels import Block
@@ -23,6 +28,7 @@ from tirebench.recording.replay import ReplayChain
 from tirebench.wire.conditions import Condition, Conditions
 from tirebench.wire.device import Device
 from tirelib.core.arrays import FloatArray
+from tirelib.core.flags import TurnFlag
 
 
 class Counter:
@@ -121,6 +127,18 @@ def test_turns_whose_load_may_be_used_are_counted() -> None:
     running = session([])
     running._note(News([made_turn(1, valid=0.0, Fz_valid=1.0), made_turn(2, valid=0.0)]))
     assert (running.outcome.count, running.outcome.valid, running.outcome.with_load) == (2, 0, 1)
+
+
+def test_what_spoils_the_load_is_counted_by_flag_and_printed_at_the_end() -> None:
+    running = session([])
+    good = replace(made_turn(1, valid=1.0, Fz_valid=1.0), flags=int(TurnFlag.BRIDGED))
+    bad = replace(made_turn(2, valid=0.0), flags=int(TurnFlag.GAP | TurnFlag.ACCELERATING))
+    running._note(News([good, bad, bad]))
+    assert running.outcome.spoiled == {"gap": 2, "accelerating": 2}
+    with StringIO() as text:
+        console = Console(file=text, width=200)
+        print_summary(console, running.outcome, FakeSource(), DeadGages(), 0.0, None, None)
+        assert "turns without Fz, by flag: gap 2, accelerating 2" in text.getvalue()
 
 
 def test_what_the_gages_show_is_passed_on_where_nobody_looks_and_nothing_turns() -> None:

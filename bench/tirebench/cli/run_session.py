@@ -17,6 +17,9 @@ from tirebench.recording.header import parts_of
 from tirebench.recording.journal import Journal
 from tirebench.recording.link import ReplayLink
 
+SPOILED = 3
+"""Flags that are named at the end of a run, the most frequent first."""
+
 
 def run_session(
     session: Session,
@@ -82,6 +85,9 @@ def print_summary(
         f"{counters(source.wheels, live=source.live)}",
         soft_wrap=True,
     )
+    if outcome.spoiled:
+        why = ", ".join(f"{name} {count}" for name, count in outcome.spoiled.most_common(SPOILED))
+        console.print(f"turns without Fz, by flag: {why} (Flags, in the reference, has remedies)")
     for text in dead.said:
         console.print(text, soft_wrap=True, markup=False)
     if link is not None and link.recording.complete is False:

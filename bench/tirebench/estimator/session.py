@@ -1,7 +1,7 @@
 """One session at the bench: take news of a source, show them, until something ends it."""
 
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -11,6 +11,7 @@ from tirebench.errors import BenchError
 from tirebench.estimator.chain import Turn, quantity_valid
 from tirebench.estimator.estimation import News
 from tirebench.estimator.wheels import Wheels
+from tirelib.core.flags import flag_names
 
 LONGEST_WAIT = 0.2
 """The longest wait for news before the screen is looked after, [s]."""
@@ -105,6 +106,8 @@ class Outcome:
         Message of the port that went away.
     count, valid, with_load : int
         Turns so far, those that may be used as a whole, and those whose Fz may be used.
+    spoiled : Counter of str
+        Names of the flags of the turns whose Fz may not be used.
     turns : list of Turn
         In the order in which their bytes came; empty unless they are to be kept.
     error : BenchError or None
@@ -118,6 +121,7 @@ class Outcome:
     count: int = 0
     valid: int = 0
     with_load: int = 0
+    spoiled: Counter[str] = field(default_factory=Counter)
     turns: list[Turn] = field(default_factory=list)
     error: BenchError | None = None
     latency: deque[float] = field(default_factory=lambda: deque(maxlen=10_000))
@@ -196,7 +200,9 @@ class Session:
     def _note(self, news: News) -> None:
         self.outcome.count += len(news.turns)
         self.outcome.valid += sum(turn.valid for turn in news.turns)
-        self.outcome.with_load += sum(quantity_valid(turn, "Fz") for turn in news.turns)
+        lost = [turn for turn in news.turns if not quantity_valid(turn, "Fz")]
+        self.outcome.with_load += len(news.turns) - len(lost)
+        self.outcome.spoiled.update(name for turn in lost for name in flag_names(turn.flags))
         self.outcome.latency.extend(news.latency)
         if self._keep:
             self.outcome.turns.extend(news.turns)
