@@ -27,6 +27,7 @@ KNOWN_NAMES: Mapping[str, str] = {
     "SA": "slip_angle",
     "IA": "camber",
     "RL": "loaded_radius",
+    "RSTAT": "loaded_radius",
     "RE": "effective_radius",
     "P": "pressure",
     "FX": "Fx",
@@ -203,6 +204,8 @@ def quantity_of(name: str) -> str:
     ('slip_angle', 'speed', 'strain_2', '')
     >>> quantity_of("Slip angle [deg]"), quantity_of("SG1 [um/m]"), quantity_of("Wheel load [kN]")
     ('slip_angle', 'strain_1', 'Fz')
+    >>> quantity_of("Fz_N"), quantity_of("slip_angle_deg"), quantity_of("t_s")
+    ('Fz', 'slip_angle', 'time')
     """
     bare = _bare(name)
     own = {quantity.casefold(): quantity for quantity in QUANTITIES if quantity != "load"}
@@ -214,7 +217,9 @@ def quantity_of(name: str) -> str:
     if gage := GAGE_NAME.fullmatch(plain):
         return f"strain_{gage[1]}"
     joined = {_plain(quantity): quantity for quantity in own.values()}
-    return KNOWN_NAMES.get(plain, joined.get(plain, ""))
+    found = KNOWN_NAMES.get(plain, joined.get(plain, ""))
+    head, _, unit = bare.rpartition("_")
+    return quantity_of(head) if not found and head and dimensions_of_unit(unit) else found
 
 
 def _bare(name: str) -> str:
