@@ -190,12 +190,8 @@ class Tire:
             for field in fields(self)
             if (fault := range_fault(field.name, getattr(self, field.name))) is not None
         ]
-        if not found and not self.ring_radius < self.free_radius:
-            found.append(
-                f"ring_radius = {1e3 * self.ring_radius:g} mm is not below free_radius = "
-                f"{1e3 * self.free_radius:g} mm; the belt lies inside the tread; exchange or "
-                "correct them"
-            )
+        if not found and (fault := radii_fault(self.ring_radius, self.free_radius)) is not None:
+            found.append(fault)
         if found:
             raise ParameterError("tire: " + "; ".join(found))
 
@@ -218,6 +214,16 @@ def unknown_name(name: str) -> str:
     near = get_close_matches(name, NUMBERS, n=2)
     hint = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(NUMBERS)}"
     return f"tire parameter {name!r} is unknown; {hint}"
+
+
+def radii_fault(ring_radius: float, free_radius: float) -> str | None:
+    """Return what is wrong with the two radii, or None."""
+    if ring_radius < free_radius:
+        return None
+    return (
+        f"ring_radius = {1e3 * ring_radius:g} mm is not below free_radius = "
+        f"{1e3 * free_radius:g} mm; the belt lies inside the tread; exchange or correct them"
+    )
 
 
 def range_fault(name: str, value: float) -> str | None:

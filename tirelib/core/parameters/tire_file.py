@@ -15,6 +15,7 @@ from tirelib.core.parameters.tire import (
     FIELDS,
     NUMBERS,
     Tire,
+    radii_fault,
     range_fault,
     unknown_name,
 )
@@ -159,10 +160,8 @@ def read_tire(name: str | Path) -> TireFile:
         )
     numbers, faults = _numbers(document)
     if not faults and all(key in numbers for key in REQUIRED):
-        try:
-            Tire(**{key: number.value for key, number in numbers.items() if key in FIELDS})
-        except ParameterError as error:
-            faults.append(str(error).removeprefix("tire: "))
+        fault = radii_fault(numbers["ring_radius"].value, numbers["free_radius"].value)
+        faults += [] if fault is None else [fault]
     if faults:
         raise FormatError([f"{path}: {fault}" for fault in faults])
     extra = {k: v for k, v in document.items() if k not in {*_GROUPS, "format", "tirelib", "name"}}

@@ -2,7 +2,7 @@
 
 import math
 import tomllib
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -250,3 +250,13 @@ def test_other_tables_of_a_model_are_kept(tmp_path: Path) -> None:
         file.numbers["mass"].std
     )
     assert read_tire(tmp_path / "n.toml").extra == file.extra
+
+
+def test_a_belt_outside_the_tread_is_refused(tmp_path: Path) -> None:
+    file = read_tire("table-6-1")
+    free = file.numbers["free_radius"].value
+    ring = replace(file.numbers["ring_radius"], value=free)
+    path = tmp_path / "tire.toml"
+    write_tire(replace(file, numbers={**file.numbers, "ring_radius": ring}), path)
+    with pytest.raises(FormatError, match=r"tire\.toml: ring_radius = .* is not below free_radius"):
+        read_tire(path)
