@@ -260,7 +260,9 @@ def _say_parameters(console: Console, parameters: list[dict[str, Any]]) -> None:
                 f"  {entry['name']}: {', '.join(entry['flags'])}; would help: {entry['helps']}"
             )
     elif helped:
-        console.print("  -v prints their values, and the test that would help with each")
+        console.print(
+            "  -v prints their values, and the test that would help; --report DIR draws them"
+        )
 
 
 def _table(parameters: list[dict[str, Any]]) -> Table:
