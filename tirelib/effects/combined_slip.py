@@ -13,6 +13,7 @@ from tirelib.effects.effect import effect
     low=-0.5,
     high=0.5,
     varies_with=("slip_angle", "slip_ratio"),
+    lacking="no run has a slip angle and a slip ratio at once",
     source="friction ellipse: adhesion along and across the wheel differ (Pacejka, ch. 3)",
 )
 def combined_slip(state: BrushState, strength: float) -> BrushState:

@@ -91,6 +91,9 @@ class Effect:
         follow otherwise. All other laws are only roughly right.
     start : tuple of float
         Strength from which a fit starts, where at zero it could go either way; zero if empty.
+    lacking : str
+        What is wrong with a plan that cannot show the effect, for instance "no run rolls the other
+        way"; by default, that no run varies one of the conditions in `varies_with`.
     """
 
     name: str
@@ -107,6 +110,7 @@ class Effect:
     untestable: str = ""
     exact: bool = False
     start: tuple[float, ...] = ()
+    lacking: str = ""
 
     def __post_init__(self) -> None:
         faults = []
@@ -270,6 +274,7 @@ def effect(
     untestable: str = "",
     exact: bool = False,
     start: tuple[float, ...] = (),
+    lacking: str = "",
 ) -> Callable[[Law], Effect]:
     """Make an effect of a law; its docstring's first line is the title.
 
@@ -300,6 +305,7 @@ def effect(
             untestable,
             exact,
             start,
+            lacking,
         )
 
     return make

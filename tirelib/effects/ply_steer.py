@@ -14,6 +14,7 @@ from tirelib.effects.effect import effect
     high=1.0,
     varies_with=("speed",),
     needs=("speed",),
+    lacking="no run rolls the other way, and in one way it is a shift of the slip angle",
     source="Pacejka, Tire and Vehicle Dynamics, ch. 4: ply-steer as an offset of the slip angle",
 )
 def ply_steer(state: BrushState, strength: float) -> BrushState:

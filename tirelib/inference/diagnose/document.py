@@ -278,4 +278,4 @@ def force_next_test(told: ForceAssessment) -> dict[str, Any]:
         words["none"] = lambda: (
             "repeat some conditions, best at the ends of load, pressure and slip"
         )
-    return _next_step(told, words, ["no run varies", "not measured", "one way"])
+    return _next_step(told, words, ["no run", "not measured"])

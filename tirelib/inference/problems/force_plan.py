@@ -31,6 +31,8 @@ def blind(at: BrushConditions, effect: Effect) -> str:
     if unknown:
         return f"{' and '.join(unknown)} is not measured at every point"
     if effect.varies_with and not any(varies(at, name) for name in effect.varies_with):
+        if effect.lacking:
+            return effect.lacking
         names = [_WORDS.get(name, name) for name in effect.varies_with]
         return f"no run varies {' or '.join(names)}"
     return ""

@@ -354,14 +354,13 @@ class ForceProblem:
             return f"cannot be computed at these conditions: {error}"
         whole = float(np.linalg.norm(rows))
         own = float(np.linalg.norm(rows - (rows @ basis) @ basis.T))
-        if whole < LEAST_SIGNAL:
-            return f"changes {self.quantity} at no point by more than noise"
         if own >= max(LEAST_SIGNAL, LEAST_OWN * whole):
             return ""
-        one_way = ": the tire rolls one way only, where it is a shift of the slip angle"
-        return "the brush's own parameters change the force alike at these conditions" + one_way * (
-            effect.name == "ply_steer"
-        )
+        if effect.lacking:
+            return effect.lacking
+        if whole < LEAST_SIGNAL:
+            return f"changes {self.quantity} at no point by more than noise"
+        return "the brush's own parameters change the force alike at these conditions"
 
 
 def fitted_constants(bench: ForceBench, quantity: str) -> tuple[str, ...]:

@@ -54,8 +54,11 @@ def test_dead_effects_are_told_with_the_condition_that_is_missing() -> None:
     assert not living & set(made.dead)
 
 
-def test_a_tire_that_rolls_one_way_cannot_show_ply_steer() -> None:
-    assert "one way only" in force_problem(speeds=(10.0, 20.0)).dead["ply_steer"]
+@pytest.mark.parametrize("speeds", [(20.0,), (10.0, 20.0)])
+def test_a_plan_that_cannot_show_an_effect_says_what_it_lacks(speeds: tuple[float, ...]) -> None:
+    dead = force_problem(speeds=speeds).dead
+    assert dead["ply_steer"].startswith("no run rolls the other way")
+    assert dead["combined_slip"] == "no run has a slip angle and a slip ratio at once"
 
 
 def test_whitened_rows_have_the_covariance_of_noise_and_of_set_points_off_in_a_block() -> None:
