@@ -32,8 +32,8 @@ from tirelib.inference.planning.force_runs import bench_ahead, force_axes, force
 from tirelib.inference.planning.next_test import next_test
 from tirelib.inference.planning.suspects import given_suspects
 from tirelib.inference.problems.forces import ForceProblem
+from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.inference.statistics.problem import Point
-from tirelib.inference.statistics.select import Hypotheses
 
 NOISE = 8.0
 """Noise of a point's side force [N]."""

@@ -11,7 +11,7 @@ import numpy as np
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError
 from tirelib.inference.planning.next_test import NextTest
-from tirelib.inference.statistics.select import Hypotheses
+from tirelib.inference.statistics.hypotheses import Hypotheses
 
 CACHE = Path(__file__).parents[1] / "out" / "next_test"
 A_PLAN = 3

@@ -136,7 +136,7 @@ def next_test(
     from tirelib.inference.planning.suspects import given_suspects, suspects_of
     from tirelib.inference.problems.strain import StrainProblem
     from tirelib.inference.problems.strain_living import in_base
-    from tirelib.inference.statistics.select import Hypotheses
+    from tirelib.inference.statistics.hypotheses import Hypotheses
     from tirelib.measured.waveforms import measure_waveforms
     from tirelib.model.registration import registered_effects
 

@@ -23,11 +23,11 @@ from tirelib.inference.diagnose.held_out import Fold, strain_folds
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.identify.delay import UNIT
 from tirelib.inference.problems.strain import StrainProblem
+from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.inference.statistics.hypothesis import Hypothesis
 from tirelib.inference.statistics.plain import BASE
 from tirelib.inference.statistics.posterior import ROUGH, Posterior, posterior
 from tirelib.inference.statistics.problem import Point
-from tirelib.inference.statistics.select import Hypotheses
 from tirelib.model.base import move
 from tirelib.physics.rolling.solve import Rolling
 

@@ -28,7 +28,7 @@ from tirelib.inference.extend.step import (
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.problems.strain import StrainProblem
 from tirelib.inference.problems.strain_living import in_base
-from tirelib.inference.statistics.select import Hypotheses
+from tirelib.inference.statistics.hypotheses import Hypotheses
 
 Progress = Callable[[str], None]
 

@@ -24,7 +24,7 @@ from tirelib.inference.planning.next_test import (
     next_test,
 )
 from tirelib.inference.planning.suspects import Suspects, suspects_of
-from tirelib.inference.statistics.select import Hypotheses
+from tirelib.inference.statistics.hypotheses import Hypotheses
 
 FORMAT = "tirelib-next-test/1"
 PROMISING = 0.5

@@ -14,10 +14,10 @@ from tirelib.inference.planning.force_runs import bench_ahead
 from tirelib.inference.planning.suspects import Suspects
 from tirelib.inference.problems.forces import ForceProblem
 from tirelib.inference.problems.strain import StrainProblem
+from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.inference.statistics.hypothesis import Hypothesis
 from tirelib.inference.statistics.next_run import Ahead, next_runs
 from tirelib.inference.statistics.problem import Point
-from tirelib.inference.statistics.select import Hypotheses
 
 NOTHING = "no_effect"
 """Name of the rival that needs no further effect."""

@@ -21,7 +21,7 @@ from tirelib.inference.diagnose.strain_models import problem_of
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.problems.strain import StrainProblem
 from tirelib.inference.statistics.chance import Plans
-from tirelib.inference.statistics.select import Hypotheses
+from tirelib.inference.statistics.hypotheses import Hypotheses
 
 FORMAT = "tirelib-selftest/1"
 NOTE = (

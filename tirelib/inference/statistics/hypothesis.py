@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from tirelib.core.arrays import FloatArray
 from tirelib.inference.statistics.null import OWN, PRIOR, Null, Products
@@ -57,6 +58,8 @@ class Hypothesis:
     p_rival : float
         p-value of the likelihood ratio in favour of the rival
         (`tirelib.inference.statistics.rival`).
+    p_beside : float
+        p-value with further effects beside these that are no larger than plain tires show.
     """
 
     fit: Posterior
@@ -68,6 +71,7 @@ class Hypothesis:
     likelihood: float
     rival: str = ""
     p_rival: float = 1.0
+    p_beside: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -96,8 +100,11 @@ class Hypothesis:
 
     @property
     def p(self) -> float:
-        """p-value of the hypothesis: of the statistic, or of its rival if that is smaller."""
-        return min(self.p_of(self.statistic)[0], self.p_rival)
+        """p-value of the hypothesis: of the statistic, or of its rival if that is smaller.
+
+        What plain tires show is no part of the hypothesis: the largest over sizes of it counts.
+        """
+        return max(min(self.p_of(self.statistic)[0], self.p_rival), self.p_beside)
 
     @property
     def p_std(self) -> float:
@@ -109,6 +116,22 @@ class Hypothesis:
         p = float(_p(np.array([statistic]), self.plain)[0])
         count = min(map(len, self.plain))
         return p, max(float(np.sqrt(p * (1.0 - p) / count)), 1.0 / (count + 1))
+
+    def p_plain(self, index: int) -> float:
+        """Return the p-value of that an effect is as large as plain tires show it.
+
+        By chi-squared of its strength, whose variance is that of the fit with roughly right laws
+        and that of plain tires; the largest over the families.
+        """
+        name, place, p = self.names[index], self.fit.place(index), 0.0
+        for null in self.nulls:
+            weighed, size = null.likeliest, null.size.of(name)
+            strength = weighed.mean(weighed.normal.right)[place]
+            left = strength - size * null.family.means.get(name, 0.0)
+            shown = size**2 * null.shown.get(name, 0.0) * np.eye(left.size)
+            square = left @ np.linalg.solve(weighed.covariance[place, place] + shown, left)
+            p = max(p, float(chi2.sf(square, left.size)))
+        return p
 
     def limit(self, alpha: float) -> float:
         """Return the statistic from which on the p-value is at most alpha."""

@@ -153,10 +153,14 @@ class Posterior:
 
     def std(self, index: int) -> FloatArray:
         """Return standard deviations of an effect's strength, in its unit."""
+        scale = self.point.effects[index].scale
+        return np.asarray(scale * np.sqrt(np.diag(self.covariance)[self.place(index)]))
+
+    def place(self, index: int) -> slice:
+        """Return where the strengths of one of the model's effects stand in the block "base"."""
         effects = self.point.effects
         first = len(self.point.base) + sum(e.components for e in effects[:index])
-        rows = slice(first, first + effects[index].components)
-        return np.asarray(effects[index].scale * np.sqrt(np.diag(self.covariance)[rows]))
+        return slice(first, first + effects[index].components)
 
 
 def posterior(

@@ -23,8 +23,8 @@ from tirelib.inference.diagnose.strain_models import Fitted
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.identify.delay import UNIT, by_delay, earlier
 from tirelib.inference.problems.strain import WIDTH, StrainProblem
+from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.inference.statistics.posterior import Posterior, posterior
-from tirelib.inference.statistics.select import Hypotheses
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import BARE, move, values_of
 
@@ -155,7 +155,7 @@ def test_the_base_is_fitted_once_from_each_start_and_its_whitening_is_about_that
         starts.append(named.get("near"))
         return posterior(problem, *words, **named)
 
-    monkeypatch.setattr("tirelib.inference.statistics.select.posterior", counted)
+    monkeypatch.setattr("tirelib.inference.statistics.hypotheses.posterior", counted)
     measured, near = runs(), values_of(TIRE)
     given = StrainProblem(measured, {**near, "tread_stiffness": 2.0 * TIRE.tread_stiffness}, ())
     among = Hypotheses(given, plain_tires())

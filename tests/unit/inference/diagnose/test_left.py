@@ -20,7 +20,7 @@ from tirelib.inference.diagnose.left import left_of, told_range
 from tirelib.inference.diagnose.strain_models import Fitted, floor_of
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.problems.strain import StrainProblem
-from tirelib.inference.statistics.select import Hypotheses
+from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import values_of
 

@@ -17,7 +17,7 @@ from tirelib.inference.diagnose.assess import ForceAssessment
 from tirelib.inference.diagnose.diagnose import Diagnosis, diagnose
 from tirelib.inference.extend.additions import additions
 from tirelib.inference.extend.extension import extended
-from tirelib.inference.statistics import select
+from tirelib.inference.statistics import hypotheses
 from tirelib.journey import add
 from tirelib.journey import diagnose as diagnose_model
 
@@ -104,7 +104,7 @@ def pair() -> Diagnosis:
 def test_strain_takes_over_the_fits_of_the_diagnosis(
     pair: Diagnosis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(select, "posterior", None)  # no hypothesis is fitted again
+    monkeypatch.setattr(hypotheses, "posterior", None)  # no hypothesis is fitted again
     first = extended(pair.models, model_of(model_file()), CATALOGUE[EFFECT])
     both = extended(pair.models, model_of(model_file()), CATALOGUE["gage_length"], first.after)
     assert first.before is pair.base

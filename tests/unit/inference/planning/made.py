@@ -15,7 +15,7 @@ from tirelib.inference.planning.envelope import Envelope
 from tirelib.inference.planning.next_test import NextTest, next_test
 from tirelib.inference.planning.suspects import Suspects, given_suspects
 from tirelib.inference.problems.strain import StrainProblem
-from tirelib.inference.statistics.select import Hypotheses
+from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.model import solution
 from tirelib.model.base import operating_points, values_of
 

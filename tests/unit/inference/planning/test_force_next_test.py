@@ -19,8 +19,8 @@ from tirelib.inference.planning.envelope import Envelope
 from tirelib.inference.planning.force_runs import bench_ahead, force_axes
 from tirelib.inference.planning.next_test import NOTHING, NextTest
 from tirelib.inference.planning.suspects import given_suspects, suspects_of
+from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.inference.statistics.problem import Point
-from tirelib.inference.statistics.select import Hypotheses
 
 PAIR = ["friction_pressure", "friction_drift"]
 BRUSH = [effect for effect in CATALOGUE.values() if effect.hook == "brush"]

@@ -8,8 +8,8 @@ import pytest
 
 from tests.unit.inference.statistics.linear_problem import N, Solved, Toy, by_effect, drawn, family
 from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.inference.statistics.next_run import next_runs
-from tirelib.inference.statistics.select import Hypotheses
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 MORE = 60

@@ -8,11 +8,12 @@ import pytest
 
 from tests.unit.inference.statistics.linear_problem import EFFECTS, N, Toy, by_effect, drawn, family
 from tirelib.core.arrays import FloatArray
+from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.inference.statistics.hypothesis import LAWS, Hypothesis
 from tirelib.inference.statistics.posterior import Posterior
 from tirelib.inference.statistics.problem import Point
 from tirelib.inference.statistics.rival import p_against
-from tirelib.inference.statistics.select import Hypotheses, select
+from tirelib.inference.statistics.select import select
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 LAW, WAYS = LAWS[1], 30

@@ -10,10 +10,11 @@ import pytest
 from tests.unit.inference.statistics.linear_problem import SHAPES, N, Solved, Toy, drawn, family
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
+from tirelib.inference.statistics.hypotheses import Hypotheses, _apart
 from tirelib.inference.statistics.hypothesis import LAWS, Hypothesis, judged
 from tirelib.inference.statistics.posterior import Posterior, posterior
 from tirelib.inference.statistics.problem import Point
-from tirelib.inference.statistics.select import Hypotheses, _apart, _further, select
+from tirelib.inference.statistics.select import _further, select
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 
@@ -69,6 +70,26 @@ def test_what_does_nothing_to_the_model_is_at_a_right_angle_to_all() -> None:
 def test_two_are_found_together() -> None:
     found = select(Toy(drawn(np.random.default_rng(2), bend=0.6, twist=0.6)), FAMILIES)
     assert {frozenset(names) for names in found.sets} == {frozenset(("bend", "twist"))}
+
+
+def test_an_effect_as_large_as_plain_tires_show_it_is_not_missing() -> None:
+    random, larger = np.random.default_rng(3), []
+    for _ in range(40):
+        hypotheses = Hypotheses(Toy(drawn(random, bend=0.6)), FAMILIES)
+        both = hypotheses.at(("bend", "twist"))
+        assert both is not None
+        alone = hypotheses.without_plain(both)
+        assert alone is not None
+        assert "bend" in alone.names
+        larger.append("twist" in alone.names)
+        # what plain tires show is no part of a hypothesis
+        assert alone.p >= both.p
+    # 5 % wanted; 5 of 40 is the upper 98 % bound of a binomial
+    assert sum(larger) <= 5
+    plain = Hypotheses(Toy(drawn(random)), FAMILIES)
+    twist = plain.at(("twist",))
+    assert twist is not None
+    assert plain.without_plain(twist) is None
 
 
 def test_what_looks_alike_is_a_set() -> None:

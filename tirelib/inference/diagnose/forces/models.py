@@ -13,10 +13,10 @@ from tirelib.inference.diagnose.forces.fit import ForceFit, MeasuredForce, fit_f
 from tirelib.inference.diagnose.held_out import Fold, force_folds
 from tirelib.inference.identify.span import span
 from tirelib.inference.problems.forces import ForceProblem
+from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.inference.statistics.hypothesis import Hypothesis
 from tirelib.inference.statistics.null import PRIOR
 from tirelib.inference.statistics.plain import BASE, ROUGHLY, Family, covering, load
-from tirelib.inference.statistics.select import Hypotheses
 
 TABLES = Path(__file__).parents[2] / "statistics"
 """Where the tables of what plain tires show are (`build/force_tires/learn.py`)."""
