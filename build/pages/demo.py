@@ -205,12 +205,12 @@ def _comparison(trained: Trained) -> Table:
     )
 
 
-Part = tuple[str, str, str, list[Drawing]]
+Drawn = tuple[str, str, str, list[Drawing]]
 
 
 def _parts(
     seen: Mapping[str, Seen], trained: Trained, camber: Trained | None, calibration: Calibration
-) -> list[Part]:
+) -> list[Drawn]:
     """Return title, anchor, text and drawings of each section."""
     set1, unseen = seen["set1"], seen["set1-unseen"]
     drawn = {drawing.name: drawing for drawing in regression_drawings(trained)}
@@ -225,7 +225,7 @@ def _parts(
         for name, part in seen.items()
         if name.endswith("-unseen")
     ]
-    parts: list[Part] = [
+    parts: list[Drawn] = [
         ("Accuracy", "accuracy", "", accuracy_drawings),
         ("Strain of a turn", "strain", "", _strain(set1)),
         (

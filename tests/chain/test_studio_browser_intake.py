@@ -65,7 +65,7 @@ def test_what_is_dropped_is_checked_or_imported(browser: Any, tmp_path: Path) ->
         page.locator("#check-again").click()
         wait_for(page, "studio.campaign.check?.errors === 0")
         drop(page, tmp_path / "messung.csv")
-        page.get_by_text("Left out: Druck vorn [bar]: row 12 holds 'Übersteuert'").wait_for()
+        page.get_by_text("Left out: Druck vorn [bar]: line 14 holds 'Übersteuert'").wait_for()
         page.get_by_label("free radius in mm").fill("316,5")
         page.get_by_label("unit of Radlast [N]").fill("kN")
         page.get_by_label("kind").select_option("corner")

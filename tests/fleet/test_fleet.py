@@ -19,6 +19,7 @@ pytest.importorskip("distributed", reason="the extra tirelib[fleet] is not insta
 from distributed import Client
 
 from tests.fleet.recordings import describe, write_drive
+from tests.trained import campaign_folder
 from tirelib.cli import program
 from tirelib.cli.fleet import run_verb
 from tirelib.core.errors import FormatError, ParameterError
@@ -251,11 +252,10 @@ def test_a_client_that_dies_loses_nothing(
 
 
 def test_calibrations_of_a_data_set_serve_every_campaign_of_their_tire(
-    campaigns: Path, calibration: Path, client: Client, tmp_path: Path
+    campaigns: Path, client: Client, tmp_path: Path
 ) -> None:
     calibrations, out = tmp_path / "calibrations", tmp_path / "estimates"
-    whole = calibration.parent / "campaign"
-    assert run("calibrate", [whole], calibrations, client, also=("--quick",)).done == 1
+    assert run("calibrate", [campaign_folder()], calibrations, client, also=("--quick",)).done == 1
     counts = run("estimate", [campaigns / "north"], out, client, calibration=calibrations)
     assert (counts.done, counts.failed) == (3, 0)
 

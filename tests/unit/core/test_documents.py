@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tirelib.core.documents import plain, write_json
+from tirelib.core.version import __version__
 
 
 @pytest.mark.parametrize("unknown", [np.nan, np.inf, -np.inf, float("inf"), np.float32("inf")])
@@ -14,7 +15,12 @@ def test_a_number_that_json_has_not_is_null(unknown: float, tmp_path: Path) -> N
     document = {"one": unknown, "list": [1.5, unknown], "array": np.array([[unknown, 2.0]])}
     write_json(tmp_path / "d.json", document)
     read = json.loads((tmp_path / "d.json").read_text())
-    assert read == {"one": None, "list": [1.5, None], "array": [[None, 2.0]]}
+    assert read == {
+        "tirelib": __version__,
+        "one": None,
+        "list": [1.5, None],
+        "array": [[None, 2.0]],
+    }
 
 
 def test_numbers_of_arrays_become_those_of_python() -> None:
