@@ -65,7 +65,7 @@ def estimate_recording(recording: Recording, calibration: Calibration) -> Iterat
     CalibrationError
         If a wheel has another tire or other gages.
     FormatError
-        As from `tirelib.campaign.blocks.blocks`.
+        If a block of the recording cannot be read (`tirelib.campaign.blocks.blocks`).
     """
     for wheel in recording.wheels:
         calibration.check_layout(wheel.tire, wheel.lateral, f"{recording.path}, {wheel.name}")

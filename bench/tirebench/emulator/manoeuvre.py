@@ -263,7 +263,7 @@ class Rig:
     ) -> Motion:
         """Return what a wheel shows at each node of its path.
 
-        `progress` is told how many of how many nodes are solved.
+        `progress` is called after each node, with the number of solved nodes and of all nodes.
         """
         shown = []
         for done, point in enumerate(path, start=1):

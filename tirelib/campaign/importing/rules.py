@@ -19,7 +19,7 @@ class ChannelRule:
     Attributes
     ----------
     quantity : str
-        As in a campaign; ``time`` and ``gage_time`` are the clocks.
+        Its name as campaign files have it. ``time`` and ``gage_time`` are the two clocks.
     column : str
         Empty for a clock that has a `rate` instead.
     unit : str

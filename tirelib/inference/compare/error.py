@@ -36,6 +36,7 @@ from tirelib.physics.rolling.solve import Start
 
 NOISE, MICROSTRAIN = "noise", "ustrain"
 PASSES = 3
+"""Gauss-Newton steps of the delay."""
 SEEN = 3.0
 """Standard deviations of a delay from which it is reported."""
 LEAST_ERROR = 1.1
@@ -234,9 +235,9 @@ def fitted_delay(
 ) -> tuple[float, float]:
     """Return the delay [s] and its standard deviation, by what of it goes with the speed.
 
-    A zero of the wheel angle that is the same in all runs stands beside it, free: at one speed it
-    is all, and no delay is reported. Damping of the sidewall or sliding comes late as well: a
-    little of them goes with it.
+    A zero of the wheel angle that is the same in all runs is fitted beside the delay, with no
+    prior. At one speed the two cannot be told apart, and no delay is reported. Damping of the
+    sidewall and sliding shift the strain too, and the delay holds a little of them.
 
     Parameters
     ----------

@@ -117,7 +117,9 @@ class Hypotheses:
         if not larger or tuple(larger) == self.added(hypothesis):
             return hypothesis if larger else None
         found = self.at(larger)
-        if found is None or found.p >= hypothesis.p:
+        if found is None:
+            return hypothesis  # the fit of fewer effects does not settle
+        if found.p >= hypothesis.p:
             return found
         out = replace(found, p_beside=hypothesis.p)
         self._made[frozenset(larger)] = out

@@ -1,4 +1,4 @@
-"""A force that camber shifts, which a model without camber lacks, is told as a shift."""
+"""A force that camber shifts, which a model without camber lacks, is reported as a shift."""
 
 from collections.abc import Iterator
 from dataclasses import replace

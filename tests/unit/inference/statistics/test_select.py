@@ -92,6 +92,19 @@ def test_an_effect_as_large_as_plain_tires_show_it_is_not_missing() -> None:
     assert plain.without_plain(twist) is None
 
 
+def test_all_effects_stay_where_the_fit_of_fewer_does_not_settle(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    hypotheses = Hypotheses(Toy(drawn(np.random.default_rng(3), bend=0.6)), FAMILIES)
+    both = hypotheses.at(("bend", "twist"))
+    assert both is not None
+    alone = hypotheses.without_plain(both)
+    assert alone is not None
+    assert hypotheses.added(alone) == ("bend",)
+    monkeypatch.setattr(hypotheses, "at", lambda names: None)
+    assert hypotheses.without_plain(both) is both
+
+
 def test_what_looks_alike_is_a_set() -> None:
     measured = drawn(np.random.default_rng(4))
     toy = Toy(measured, alike=True)
