@@ -169,7 +169,7 @@ def test_a_stream_says_at_every_frame_what_numpy_says(kind: str) -> None:
 def test_a_state_is_of_what_computes() -> None:
     known = live.calibration()
     one, other = StreamEstimator(known, live.RATE), NumpyEstimator(known, live.RATE)
-    with pytest.raises(FormatError, match="this version reads 'tirelib-core-state/2'"):
+    with pytest.raises(FormatError, match="this version reads 'tirelib-core-state/3'"):
         one.restore(other.state())
     with pytest.raises(FormatError, match="this version reads 'tirelib-stream-state"):
         other.restore(one.state())

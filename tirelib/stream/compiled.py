@@ -31,7 +31,7 @@ from tirelib.stream.estimate import TurnEstimate
 from tirelib.stream.estimator import StreamEstimator
 from tirelib.stream.snapshot import from_plain, to_plain
 
-STATE_FORMAT = "tirelib-core-state/2"
+STATE_FORMAT = "tirelib-core-state/3"
 
 
 class CompiledEstimator(StreamEstimator):

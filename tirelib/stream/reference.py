@@ -19,7 +19,7 @@ from tirelib.stream.estimate import TurnEstimate
 from tirelib.stream.estimator import STANDSTILL, WATCHDOG_TURNS, StreamEstimator
 from tirelib.stream.snapshot import from_plain, restore_cutter, snapshot_cutter, to_plain
 
-STATE_FORMAT = "tirelib-stream-state/7"
+STATE_FORMAT = "tirelib-stream-state/8"
 _OMEGA = HELD.index("omega")
 
 

@@ -16,17 +16,18 @@ its middle:
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.compiled import GAGES, loaded_core
 from tirelib.core.flags import TurnFlag
+from tirelib.core.traces import Conditions
 from tirelib.measured.features.compiled import read_by_core
 from tirelib.measured.features.peaks import peak
-from tirelib.measured.signal.turn import PHI
-from tirelib.measured.signal.turns import AFTER, Turns
+from tirelib.measured.signal.turn import PHI, Turns, TurnValues
+from tirelib.measured.signal.turns import AFTER
 
 EDGE_REACH = 0.35
 """How far outside the centre gage's pulse a leading edge is looked for, [rad]."""
@@ -37,7 +38,7 @@ INTEGRAL_POINTS = 65
 
 
 @dataclass(frozen=True, slots=True)
-class Features:
+class Features(TurnValues):
     """Features of several turns; arrays over gages have shape (n, n_gages), the rest (n,).
 
     Angles are from the middle of the centre gage's pulse, [rad]; strains are above the offset,
@@ -60,20 +61,10 @@ class Features:
     skew
         First moment of the strain about the middle of the contact over e_vertical, [rad]: zero for
         a symmetric contact.
-    mean
-        Mean strain of the preceding turn above the offset.
-    offset
-        Strain opposite the contact.
-    time, ready, period, omega, speed, pressure, camber, axis_shift
-        Values of the turn, SI; `omega`, `speed` and `camber` at its contact.
-    angle_std, slip_std
-        Relative standard deviation of angles about the contact, and of ``omega / speed``.
-    offset_std : shape (n, n_gages)
-        Standard deviation of the offset.
-    friction, tread_depth, tread_temperature
-        What was said of road and tread, SI.
-    flags, gage_flags
-        `TurnFlag` bits.
+    omega, speed, pressure, camber
+        Conditions of the turn, SI; all but the pressure are those at its contact.
+    axis_shift
+        Wheel angle of the pulse's middle, from a trigger, [rad].
     lateral : shape (n_gages,), [m]
         Gage positions, ISO.
     """
@@ -91,24 +82,11 @@ class Features:
     e_vertical: FloatArray
     e_friction: FloatArray
     skew: FloatArray
-    mean: FloatArray
-    offset: FloatArray
-    time: FloatArray
-    ready: FloatArray
-    period: FloatArray
     omega: FloatArray
     speed: FloatArray
     pressure: FloatArray
     camber: FloatArray
-    friction: FloatArray
-    tread_depth: FloatArray
-    tread_temperature: FloatArray
     axis_shift: FloatArray
-    offset_std: FloatArray
-    angle_std: FloatArray
-    slip_std: FloatArray
-    flags: IntArray
-    gage_flags: IntArray
     lateral: FloatArray
 
     @property
@@ -120,9 +98,6 @@ class Features:
     def centre_gage(self) -> int:
         """Index of the gage nearest to the equator."""
         return int(np.argmin(np.abs(self.lateral)))
-
-    def __len__(self) -> int:
-        return int(self.time.shape[0])
 
 
 def extract_features(turns: Turns) -> Features:
@@ -187,29 +162,12 @@ def features_of(
     turns: Turns, read: Mapping[str, FloatArray], gage_flags: IntArray, flags: IntArray
 ) -> Features:
     """Return features: those that were read from the curves, and what the turns bring."""
-    trace = turns.trace
-    return Features(
-        **read,
-        mean=turns.mean,
-        offset=turns.offset,
-        time=turns.time,
-        ready=turns.ready,
-        period=turns.period,
-        omega=trace.conditions.omega,
-        speed=trace.conditions.speed,
-        pressure=trace.conditions.pressure,
-        camber=trace.conditions.camber,
-        friction=turns.friction,
-        tread_depth=turns.tread_depth,
-        tread_temperature=turns.tread_temperature,
-        axis_shift=trace.axis_shift,
-        offset_std=turns.offset_std,
-        angle_std=turns.angle_std,
-        slip_std=turns.slip_std,
-        flags=flags,
-        gage_flags=gage_flags,
-        lateral=trace.lateral,
-    )
+    trace, conditions = turns.trace, turns.trace.conditions
+    brought = {field.name: getattr(turns, field.name) for field in fields(TurnValues)}
+    brought |= {field.name: getattr(conditions, field.name) for field in fields(Conditions)}
+    brought |= {"flags": flags, "gage_flags": gage_flags}
+    brought |= read
+    return Features(**brought, axis_shift=trace.axis_shift, lateral=trace.lateral)
 
 
 def _integrals(

@@ -47,12 +47,11 @@ class Turn:
 
 
 @dataclass(frozen=True, slots=True)
-class Turns:
-    """Several turns of one wheel.
+class TurnValues:
+    """What is known of turns besides their curves; features have the same.
 
     Attributes
     ----------
-    trace : StrainTrace
     time, ready, period : shape (n,), [s]
     angle_std, slip_std : shape (n,), [1]
         Relative standard deviation of wheel angles about the contact, and of the ratio of turn rate
@@ -67,10 +66,8 @@ class Turns:
         What was said of road and tread; NaN where unknown.
     gage_flags : shape (n, n_gages); flags : shape (n,)
         `TurnFlag` bits.
-    rate_hz : float, [Hz]
     """
 
-    trace: StrainTrace
     time: FloatArray
     ready: FloatArray
     period: FloatArray
@@ -84,10 +81,23 @@ class Turns:
     tread_temperature: FloatArray
     gage_flags: IntArray
     flags: IntArray
-    rate_hz: float
 
     def __len__(self) -> int:
         return int(self.time.shape[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Turns(TurnValues):
+    """Several turns of one wheel.
+
+    Attributes
+    ----------
+    trace : StrainTrace
+    rate_hz : float, [Hz]
+    """
+
+    trace: StrainTrace
+    rate_hz: float
 
 
 def unknown_turn(time: float, ready: float, gages: int, flags: TurnFlag) -> Turn:
@@ -121,17 +131,7 @@ def turns_of(columns: Mapping[str, Any], lateral: FloatArray, rate: float) -> Tu
         conditions=Conditions(**{name: columns[name] for name in conditions}),
         **{name: columns[name] for name in ("strain", "rate", "pulse", "axis_shift")},
     )
-    return Turns(
-        trace=trace,
-        rate_hz=rate,
-        gage_flags=columns["gage_flags"].astype(np.int64),
-        flags=columns["flags"].astype(np.int64),
-        **{name: columns[name] for name in _PLAIN},
-    )
-
-
-_PLAIN = (
-    *("time", "ready", "period", "angle_std", "slip_std", "offset", "offset_std", "mean"),
-    *("friction", "tread_depth", "tread_temperature"),
-)
-"""Attributes of a turn that turns have under the same name."""
+    values = {field.name: columns[field.name] for field in fields(TurnValues)}
+    for name in ("gage_flags", "flags"):
+        values[name] = values[name].astype(np.int64)
+    return Turns(trace=trace, rate_hz=rate, **values)
