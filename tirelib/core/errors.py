@@ -39,9 +39,12 @@ class TirelibError(Exception):
     ----------
     faults : tuple of Fault
         The faults among the arguments; empty where an error was raised with a text alone.
+    point : int or None
+        Index of the operating point that the message names; None where it names none.
     """
 
-    def __init__(self, *said: object) -> None:
+    def __init__(self, *said: object, point: int | None = None) -> None:
+        self.point = point
         self.faults = tuple(each for each in said if isinstance(each, Fault))
         super().__init__(*map(str, said))
 
@@ -89,10 +92,12 @@ class ConvergenceError(TirelibError, RuntimeError):
         What is left of the equations there, in their own unit (the message names it).
     """
 
-    def __init__(self, message: str, iterate: object, residual: float) -> None:
+    def __init__(
+        self, message: str, iterate: object, residual: float, point: int | None = None
+    ) -> None:
         self.iterate = iterate
         self.residual = residual
-        super().__init__(message)
+        super().__init__(message, point=point)
 
-    def __reduce__(self) -> tuple[type["ConvergenceError"], tuple[str, object, float]]:
-        return type(self), (str(self), self.iterate, self.residual)
+    def __reduce__(self) -> tuple[type["ConvergenceError"], tuple[str, object, float, int | None]]:
+        return type(self), (str(self), self.iterate, self.residual, self.point)

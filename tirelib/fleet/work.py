@@ -25,7 +25,7 @@ from tirelib.campaign.plan import parse_plans
 from tirelib.campaign.problem import Problem, errors_of
 from tirelib.campaign.recording import FILE as RECORDING
 from tirelib.campaign.recording import read_recording
-from tirelib.core.errors import FormatError, TirelibError
+from tirelib.core.errors import Fault, FormatError, TirelibError
 from tirelib.core.version import __version__
 from tirelib.fleet.dataset import HEAD, DataSet, now
 from tirelib.fleet.rows import Channels, Row, every, result_rows
@@ -131,7 +131,7 @@ def process(source: Source, mark: str, recipe: Recipe, address: str, verb: Verb)
         try:
             return _processed(source, mark, recipe, DataSet(address), verb)
         except TirelibError as error:
-            cause = error.faults[0].given if error.faults else str(error).partition(";")[0]
+            cause = error.faults[0].given if error.faults else str(error)
             return failed(source, mark, recipe, str(error), cause)
         except Exception as error:  # one bad source never stops the others
             lines = traceback.format_exception_only(error)
@@ -182,8 +182,12 @@ def _check_seen(source: Source, data: DataSet) -> None:
     ):
         if not seen:
             raise FormatError(
-                f"{url}: no such folder on the worker's machine; a path must be the same folder on "
-                f"every machine, {socket.gethostname()} too: give a shared file system or a URL"
+                Fault(
+                    url,
+                    "no such folder on the worker's machine",
+                    f"a path must be the same folder on every machine, {socket.gethostname()} too",
+                    "give a shared file system or a URL",
+                )
             )
 
 
@@ -241,8 +245,12 @@ def _compute(job: _Job, folder: Path, aside: Path, verb: Verb) -> Outcome:
     about = _about(folder)
     if about.kind == "recording" and recipe.task != "estimate":
         raise FormatError(
-            f"{job.source.url}: a recording is given; {recipe.task} takes campaigns, and estimate "
-            "takes both; leave it out of PATHS"
+            Fault(
+                job.source.url,
+                "a recording is given",
+                f"{recipe.task} takes campaigns, and estimate takes both",
+                "leave it out of PATHS",
+            )
         )
     answer = aside / "answer.json"
     turns = aside / "turns.parquet"
@@ -382,7 +390,11 @@ def _local(address: str, path: str, content: str, about: _About) -> Path:
         if about.faults:
             raise FormatError(about.faults)
         raise FormatError(
-            f"tire {about.tire!r}: {index['data_set']} holds nothing of this campaign or tire; run "
-            "the task that makes it over the same paths first"
+            Fault(
+                f"tire {about.tire!r}",
+                f"{index['data_set']} holds nothing of this campaign or tire",
+                "a calibration or a model of it is needed",
+                "run the task that makes it over the same paths first",
+            )
         )
     return _kept(index["data_set"], found)

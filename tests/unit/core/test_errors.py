@@ -1,14 +1,18 @@
 """An error says where, what was given, what is allowed and what to do, as text and as fields."""
 
+import ast
 import pickle
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import tirelib
 from tirelib.campaign.mdf import read_mdf
 from tirelib.campaign.problem import Problem, raise_errors
 from tirelib.core.errors import ConvergenceError, Fault, FormatError, ParameterError, TirelibError
 from tirelib.core.units import to_si
+from tirelib.physics.ring.ring import Ring
 
 HERE = Fault("M.toml, ring.mass", "-1 kg", "a mass is above 0", "correct it")
 THERE = Fault("", "no unit; at all", "allowed are m", "add it")
@@ -71,5 +75,25 @@ def test_an_unreadable_run_file_is_stated_in_parts(tmp_path: Path, content: byte
 
 
 def test_an_iteration_that_failed_in_another_process_keeps_its_iterate_and_residual() -> None:
-    there = pickle.loads(pickle.dumps(ConvergenceError("no contact", [1.0, 2.0], 0.5)))
+    there = pickle.loads(pickle.dumps(ConvergenceError("no contact", [1.0, 2.0], 0.5, 3)))
     assert (str(there), there.iterate, there.residual) == ("no contact", [1.0, 2.0], 0.5)
+    assert there.point == 3
+
+
+def test_every_message_that_names_a_point_hands_its_index_on() -> None:
+    named = 0
+    for file in (Path(tirelib.__file__).parent / "physics").rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if not (isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call)):
+                continue
+            texts = [t for t in ast.walk(node.exc) if isinstance(t, ast.JoinedStr)]
+            if any("point {" in ast.unparse(text) for text in texts):
+                named += 1
+                assert "point" in {k.arg for k in node.exc.keywords}, f"{file}, line {node.lineno}"
+    assert named >= 20
+
+
+def test_a_ring_says_which_point_is_wrong() -> None:
+    with pytest.raises(ParameterError, match="at point 2; a finite number") as raised:
+        Ring(0.3, 2.0, 3.0, 1e4, 1e5, 1e5, tension=np.array([0.0, 0.0, np.inf]))
+    assert raised.value.point == 2

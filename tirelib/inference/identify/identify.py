@@ -1,6 +1,5 @@
 """Identify a tire from a campaign: every number with an interval, and what it would take."""
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -103,7 +102,7 @@ def identify(
     try:
         start, fit, estimates = estimated(runs, tire, base=base, progress=progress, found=tell)
     except TirelibError as error:
-        error.args = (_with_run(str(error), runs),)
+        error.args = (_with_run(error, runs),)
         raise
     deviation = np.sqrt(np.diag(fit.covariance))
     correlation = fit.covariance / np.outer(deviation, deviation)
@@ -138,10 +137,12 @@ def _contradictions(start: TireFile, estimates: tuple[Estimate, ...]) -> tuple[s
     return tuple(out)
 
 
-def _with_run(message: str, runs: StraightRuns) -> str:
-    """Return a message of the model with the campaign's run in place of the point's index."""
-    run = runs.waves.run
-    said = re.sub(r"point (\d+)", lambda m: f"run {run[min(int(m[1]), run.size - 1)]}", message)
+def _with_run(error: TirelibError, runs: StraightRuns) -> str:
+    """Return an error's message with the campaign's run in place of the model's point."""
+    said = str(error)
+    if error.point is not None:
+        run = runs.waves.run[min(error.point, runs.waves.run.size - 1)]
+        said = said.replace(f"point {error.point}", f"run {run}")
     return f"{runs.waves.header.name}: {said}"
 
 

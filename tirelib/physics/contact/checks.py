@@ -55,7 +55,8 @@ def column(
         point = int(np.argmin(good))
         raise ParameterError(
             f"{where}: {name} = {flat[point]:.6g} {unit} at point {point}; a finite "
-            f"number{' > 0' if positive else ''} is needed; check sign and unit"
+            f"number{' > 0' if positive else ''} is needed; check sign and unit",
+            point=point,
         )
     return np.broadcast_to(flat, (n_points,)).copy()
 
@@ -117,7 +118,8 @@ def check_angle(where: str, contact: Pressed, at: ComplianceAt, tread: Tread) ->
             f"{where}: point {point} at d0 = {1e3 * contact.deflection[point]:.1f} mm, "
             f"Fz = {contact.load[point]:.0f} N has a half contact angle of {half[point]:.2f} rad; "
             f"the ring holds up to {LARGEST_ANGLE} rad: {range_text(at, tread, point)}; lower the "
-            "load or check the stiffness"
+            "load or check the stiffness",
+            point=point,
         )
 
 
@@ -143,6 +145,7 @@ def check_one_patch(where: str, contact: Pressed, overlap: FloatArray) -> None:
             "load is needed",
             contact,
             float(max(pull[point], press[point])),
+            point=point,
         )
 
 
@@ -166,7 +169,8 @@ def check_tread(
             f"{where}: point {point} at Fz = {load[point]:.0f} N, d0 = "
             f"{1e3 * deflection[point]:.2f} mm: tread pressed by {1e3 * deepest[point]:.3g} mm; "
             f"must stay below its thickness {1e3 * rubber[point]:.3g} mm (52); lower the load or "
-            "check the tread's stiffness"
+            "check the tread's stiffness",
+            point=point,
         )
 
 
@@ -178,5 +182,6 @@ def check_radii(where: str, tread: Tread, radius: FloatArray) -> None:
         point = int(np.argmin(depth))
         raise ParameterError(
             f"{where}: point {point} has h_0 = free radius - ring radius = "
-            f"{1e3 * depth[point]:.2f} mm; the tread must stand outside the belt; check both radii"
+            f"{1e3 * depth[point]:.2f} mm; the tread must stand outside the belt; check both radii",
+            point=point,
         )

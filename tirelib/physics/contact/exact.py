@@ -216,7 +216,8 @@ def _check_half_angle(half: FloatArray, loads: FloatArray, ring: Ring, tread: Tr
             f"angle of {half[point]:.2g} rad; {energy.N_MODES} harmonics resolve "
             f"{SMALLEST_ANGLE} rad and more; the load is too small for a tread of "
             f"{np.broadcast_to(tread.normal_stiffness, half.shape)[point]:.3g} N/m^2: use the "
-            "linear contact, which agrees there, a larger load or a softer tread"
+            "linear contact, which agrees there, a larger load or a softer tread",
+            point=point,
         )
     large = ~(half < energy.PATCH)
     if large.any():
@@ -228,6 +229,7 @@ def _check_half_angle(half: FloatArray, loads: FloatArray, ring: Ring, tread: Tr
             f"{energy.PATCH} rad; by the linear ring {carries}; use a smaller load",
             half,
             float(energy.PATCH),
+            point=point,
         )
 
 

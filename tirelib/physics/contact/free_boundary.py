@@ -284,5 +284,6 @@ def refuse_point(point: int, d0: FloatArray, problem: ContactProblem) -> None:
     raise ParameterError(
         f"contact: point {point}: {given} is more than this tire carries within the ring's "
         f"validity: {range_text(problem.at, problem.tread, point)}; lower it or check stiffness "
-        "and pressure"
+        "and pressure",
+        point=point,
     )

@@ -317,7 +317,8 @@ def _check_torque(
         raise ParameterError(
             f"{_WHERE}: point {point}: torque = {torque[point]:.6g} N m; friction holds some "
             f"mu Fz R_l = {limit[point]:.4g} N m at Fz = {fz[point]:.0f} N; lower the torque, or "
-            "raise load or friction"
+            "raise load or friction",
+            point=point,
         )
 
 

@@ -271,7 +271,9 @@ def press_to_load(
         raise ParameterError(
             f"static contact: point {worst}: load = {wanted.flat[worst]:g} N; this tire carries 0 "
             f"to {most.flat[worst]:.4g} N up to a deflection of "
-            f"{LARGEST_DEFLECTION * outer.flat[worst]:.3g} m; lower the load or raise the stiffness"
+            f"{LARGEST_DEFLECTION * outer.flat[worst]:.3g} m; lower the load or raise the "
+            "stiffness",
+            point=worst,
         )
     for _ in range(_LOAD_ITERATIONS):
         middle = high - above * (high - low) / (above - below)
@@ -326,7 +328,8 @@ def _check_tread(tire: StaticTire, solved: StaticContact) -> None:
         raise ParameterError(
             f"static contact: point {point} at {solved.load.flat[point]:.4g} N: tread pressed by "
             f"{compression.flat[point]:.3g} m; must stay below its thickness "
-            f"{thickness.flat[point]:.3g} m (52); raise tread_stiffness or lower the load"
+            f"{thickness.flat[point]:.3g} m (52); raise tread_stiffness or lower the load",
+            point=point,
         )
 
 

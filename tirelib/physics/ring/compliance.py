@@ -190,5 +190,6 @@ def _refuse_critical(stiffness: FloatArray, scale: FloatArray) -> None:
         raise ParameterError(
             f"ring: point {point} has no stiffness left in harmonic {mode} "
             f"({stiffness[point, mode]:.4g} N/m^2, non-rotating scale {scale[point, mode]:.4g}); "
-            "the speed is beyond a critical speed or a stiffness is not physical"
+            "the speed is beyond a critical speed or a stiffness is not physical",
+            point=int(point),
         )

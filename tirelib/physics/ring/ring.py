@@ -83,7 +83,8 @@ class Ring:
                 raise ParameterError(
                     f"ring: {field.name} = {value.flat[point]:g} at point {point}; a finite number "
                     f"is needed (only {' and '.join(sorted(_INFINITE))} may be infinite); check "
-                    "the tire's value"
+                    "the tire's value",
+                    point=point,
                 )
             lowest = value.min() if value.size else np.nan
             positive = field.name in _POSITIVE

@@ -124,7 +124,8 @@ class Constants:
                 sign = "a finite number" if field.name in _SIGNED else f"a finite number {sign}"
                 raise ParameterError(
                     f"rolling ring: {field.name} = {value[point]:.6g} at point {point}; {sign} is "
-                    "needed; check the tire's value and its dependence on pressure and deflection"
+                    "needed; check the tire's value and its dependence on pressure and deflection",
+                    point=point,
                 )
         flat = self.free_radius <= self.radius
         if flat.any():
@@ -132,7 +133,8 @@ class Constants:
             raise ParameterError(
                 f"rolling ring: point {point} has h_0 = free radius - ring radius = "
                 f"{1e3 * (self.free_radius - self.radius)[point]:.2f} mm; the tread must stand "
-                "outside the belt; check both radii"
+                "outside the belt; check both radii",
+                point=point,
             )
 
     @property

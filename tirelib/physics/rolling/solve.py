@@ -250,6 +250,7 @@ def _newton(k: Constants, start: Unknowns, grid: Mesh, tolerance: float) -> tupl
         "belt or less friction",
         x.depth,
         float(reach.max()),
+        point=worst,
     )
 
 
@@ -285,6 +286,7 @@ def _check(found: Rolling) -> None:
             f"{PATCH} rad on a side; use a smaller load or check the stiffness",
             found.deflection,
             PATCH,
+            point=point,
         )
     half = 0.5 * np.ptp(np.where(delta > 0.0, phi, 0.0), axis=1)
     small = half < SMALLEST_ANGLE
@@ -293,7 +295,8 @@ def _check(found: Rolling) -> None:
         raise ParameterError(
             f"rolling ring: point {point} at {k.load[point]:.4g} N touches the road over a half "
             f"angle of {half[point]:.2g} rad; the elements resolve {SMALLEST_ANGLE} rad and more; "
-            "use a larger load or a softer tread"
+            "use a larger load or a softer tread",
+            point=point,
         )
     deepest = delta.max(axis=1)
     through = deepest >= k.thickness
@@ -303,7 +306,8 @@ def _check(found: Rolling) -> None:
             f"rolling ring: point {point} at Fz = {k.load[point]:.0f} N, d0 = "
             f"{1e3 * found.deflection[point]:.2f} mm: tread pressed by {1e3 * deepest[point]:.3g} "
             f"mm; must stay below its thickness {1e3 * k.thickness[point]:.3g} mm (52); lower the "
-            "load or check the tread's stiffness"
+            "load or check the tread's stiffness",
+            point=point,
         )
 
 

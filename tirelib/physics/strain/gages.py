@@ -117,7 +117,8 @@ def gage_trace(
         point = int(np.flatnonzero(np.isnan(contact.edges[:, centre, 0]))[0])
         raise ParameterError(
             f"gages: the centre strip of point {point} is off the road, so the angle has no zero; "
-            "lower the camber or raise the load"
+            "lower the camber or raise the load",
+            point=point,
         )
     shift, pulse = _pulse(harmonics[:, centre])
     n = np.arange(harmonics.shape[-1])

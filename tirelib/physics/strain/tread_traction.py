@@ -181,7 +181,8 @@ def tread_strain(contact: StripContact, traction: FloatArray, beam: TreadBeam) -
         raise ParameterError(
             f"tread strain: the traction of point {point}, strip {strip} has a resultant of "
             f"{rest[point, strip] / size[point, strip]:.1%} of its size; none is allowed: give "
-            "drive and brake forces to `press_strips`"
+            "drive and brake forces to `press_strips`",
+            point=int(point),
         )
     n_modes = contact.displacement.shape[-2] - 1
     flat = (-1, force.shape[-1])

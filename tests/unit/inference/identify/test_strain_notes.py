@@ -9,7 +9,7 @@ import pytest
 from tests.synthetic import synthetic_run, write
 from tests.unit.inference.identify.model_waves import made_waves
 from tirelib.campaign import Campaign, RunPlan, read_campaign
-from tirelib.core.errors import CalibrationError
+from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.inference.identify.campaign_data import straight_runs
 from tirelib.inference.identify.estimate import Estimate
 from tirelib.inference.identify.identify import _contradictions, _with_run, start_file
@@ -131,7 +131,9 @@ def test_a_measured_length_that_the_strain_contradicts_is_said(waves: Waveforms)
 
 def test_messages_of_the_model_name_the_run(waves: Waveforms) -> None:
     runs = straight_runs(waves.take(np.array([5, 4, 3, 2, 1, 0])))
-    assert _with_run("contact: point 1 at 9 N", runs).endswith("contact: run 4 at 9 N")
+    error = ParameterError("contact: point 1 at 9 N", point=1)
+    assert _with_run(error, runs).endswith("contact: run 4 at 9 N")
+    assert _with_run(ParameterError("point 1 of nothing"), runs).endswith(": point 1 of nothing")
 
 
 def campaign_of(plans: list[RunPlan], waves: Waveforms) -> Campaign:
