@@ -1,5 +1,6 @@
 """Campaigns: folders of measurements in the format ``tirelib-campaign/1``."""
 
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.check import check_campaign
 from tirelib.campaign.conditions import conditions_of
 from tirelib.campaign.model import (
@@ -11,16 +12,15 @@ from tirelib.campaign.model import (
     TireGeometry,
     Tolerance,
 )
-from tirelib.campaign.problem import Problem
 from tirelib.campaign.read import Campaign, read_campaign
 from tirelib.campaign.write import write_campaign
 
 __all__ = [
     "BoolArray",
     "Campaign",
+    "CampaignFault",
     "CampaignHeader",
     "FloatArray",
-    "Problem",
     "Run",
     "RunPlan",
     "TireGeometry",

@@ -8,6 +8,7 @@ import numpy as np
 
 from tirelib.campaign import header as header_file
 from tirelib.campaign import plan as plan_file
+from tirelib.campaign.campaign_fault import CampaignFault, errors_of
 from tirelib.campaign.check_folder import copy_problems, extra_files, repeat_problems
 from tirelib.campaign.check_gages import gage_findings
 from tirelib.campaign.check_order import (
@@ -24,14 +25,13 @@ from tirelib.campaign.check_turns import turn_findings
 from tirelib.campaign.finding import RunFinding, gathered
 from tirelib.campaign.mdf import read_mdf
 from tirelib.campaign.model import CampaignHeader, Run, RunPlan
-from tirelib.campaign.problem import Problem, errors_of
 from tirelib.campaign.runfile import inspect_run
 from tirelib.core.errors import FormatError
 
 Progress = Callable[[int, int], None]
 
 
-def check_campaign(path: str | Path, *, progress: Progress | None = None) -> list[Problem]:
+def check_campaign(path: str | Path, *, progress: Progress | None = None) -> list[CampaignFault]:
     """Return every fault of a campaign folder, in reading order.
 
     Parameters
@@ -42,7 +42,7 @@ def check_campaign(path: str | Path, *, progress: Progress | None = None) -> lis
 
     Returns
     -------
-    problems : list of Problem
+    problems : list of CampaignFault
         Empty for a sound campaign. A fault that most runs share is one problem.
 
     Raises
@@ -73,19 +73,21 @@ def check_campaign(path: str | Path, *, progress: Progress | None = None) -> lis
     return [*problems, *repeat_problems(plans), *extra_files(folder)]
 
 
-def _legible(folder: Path, plans: tuple[RunPlan, ...], progress: Progress | None) -> list[Problem]:
+def _legible(
+    folder: Path, plans: tuple[RunPlan, ...], progress: Progress | None
+) -> list[CampaignFault]:
     """Check only that the run files can be read: without a header their meaning is unknown."""
-    problems: list[Problem] = []
+    problems: list[CampaignFault] = []
     for done, plan in enumerate(plans, start=1):
         try:
             read_mdf(folder / plan.file)
         except FormatError as error:
-            problems += [Problem.at(plan.file, fault) for fault in error.faults]
+            problems += [CampaignFault.at(plan.file, fault) for fault in error.faults]
         if progress is not None:
             progress(done, len(plans))
     if plans:
         problems.append(
-            Problem(
+            CampaignFault(
                 header_file.FILE,
                 "as it stands, the contents of the runs could not be checked",
                 "a header without errors is needed for that",
@@ -98,7 +100,7 @@ def _legible(folder: Path, plans: tuple[RunPlan, ...], progress: Progress | None
 
 def _run_problems(
     folder: Path, header: CampaignHeader, plans: tuple[RunPlan, ...], progress: Progress | None
-) -> list[Problem]:
+) -> list[CampaignFault]:
     findings: list[RunFinding] = []
     summaries: list[RunSummary] = []
     signs: list[ForceSign] = []
@@ -135,7 +137,7 @@ def _content(run: Run, header: CampaignHeader, *, whole: bool) -> list[RunFindin
     return found + rig_findings(run, header)
 
 
-def _as_finding(file: str, problem: Problem) -> RunFinding:
+def _as_finding(file: str, problem: CampaignFault) -> RunFinding:
     """Return a fault of reading as a finding; what differs between runs is the place only."""
     channel = problem.where.partition(", channel ")[2]
     return RunFinding(f"{problem.severity} {channel} {problem.given}", file, channel, problem)
@@ -151,13 +153,13 @@ def _digest(run: Run) -> str:
     return digest.hexdigest()
 
 
-def _strain_missing(header: CampaignHeader, strained: list[bool]) -> list[Problem]:
+def _strain_missing(header: CampaignHeader, strained: list[bool]) -> list[CampaignFault]:
     """Warn when sound runs lack the strain that the header declares."""
     missing = strained.count(False)
     if not header.gage_lateral or not missing:
         return []
     return [
-        Problem(
+        CampaignFault(
             header_file.FILE,
             f"[gages] declares {len(header.gage_lateral)} gages, but {missing} of "
             f"{len(strained)} runs have no strain",

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tirelib.campaign import plan as plan_file
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.model import RunPlan
-from tirelib.campaign.problem import Problem
 
 _SUFFIXES = frozenset({".mf4", ".mdf", ".dat"})
 
 
-def extra_files(folder: Path) -> list[Problem]:
+def extra_files(folder: Path) -> list[CampaignFault]:
     """Return a warning for each recording in the folder that ``runs.csv`` does not list.
 
     None where ``runs.csv`` names no files at all: that is the fault to mend first.
@@ -20,7 +20,7 @@ def extra_files(folder: Path) -> list[Problem]:
     if listed is None:
         return []
     return [
-        Problem(
+        CampaignFault(
             file,
             "the file is not listed in runs.csv",
             "every recording has its row",
@@ -49,7 +49,7 @@ def _listed(folder: Path) -> set[str] | None:
     return {(row.get("file") or "").strip().removeprefix("./") for row in rows}
 
 
-def repeat_problems(plans: Sequence[RunPlan]) -> list[Problem]:
+def repeat_problems(plans: Sequence[RunPlan]) -> list[CampaignFault]:
     """Return a warning when no set point was measured twice; sweeps repeat within themselves."""
     if not plans or any(plan.kind == "sweep" for plan in plans):
         return []
@@ -59,7 +59,7 @@ def repeat_problems(plans: Sequence[RunPlan]) -> list[Problem]:
     if len(set(points)) < len(points):
         return []
     return [
-        Problem(
+        CampaignFault(
             plan_file.FILE,
             f"none of the {len(points)} set points was measured twice",
             "a few repeats are needed to measure the noise",
@@ -69,7 +69,7 @@ def repeat_problems(plans: Sequence[RunPlan]) -> list[Problem]:
     ]
 
 
-def copy_problems(digests: Sequence[tuple[str, str]]) -> list[Problem]:
+def copy_problems(digests: Sequence[tuple[str, str]]) -> list[CampaignFault]:
     """Return an error for each run whose samples are those of an earlier one.
 
     Parameters
@@ -77,11 +77,11 @@ def copy_problems(digests: Sequence[tuple[str, str]]) -> list[Problem]:
     digests : sequence of (file, digest of its samples)
     """
     first: dict[str, str] = {}
-    problems: list[Problem] = []
+    problems: list[CampaignFault] = []
     for file, digest in digests:
         if digest in first:
             problems.append(
-                Problem(
+                CampaignFault(
                     file,
                     f"duplicate run: its samples are those of {first[digest]}",
                     "a repeat is a new measurement with its own noise",

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.finding import RunFinding, finding
 from tirelib.campaign.model import BoolArray, CampaignHeader, FloatArray, Run
-from tirelib.campaign.problem import Problem
 from tirelib.campaign.turns import turn_samples, turn_stack
 
 _FEATURES = 3  # highest, middle, lowest strain of a turn
@@ -83,7 +83,7 @@ def _conditions(run: Run) -> FloatArray:
 
 def order_findings(
     summaries: Sequence[RunSummary], header: CampaignHeader
-) -> tuple[list[RunFinding], list[Problem]]:
+) -> tuple[list[RunFinding], list[CampaignFault]]:
     """Return runs with swapped gages, and a lateral order that the whole campaign contradicts."""
     usable = [s for s in summaries if s.features is not None and np.isfinite(s.conditions).all()]
     if not usable or len(header.gage_lateral) < 2:
@@ -231,7 +231,7 @@ def _best_order(cost: FloatArray) -> list[int]:
 
 def _lateral_order(
     regressors: FloatArray, coefficients: FloatArray, sigma: FloatArray, header: CampaignHeader
-) -> list[Problem]:
+) -> list[CampaignFault]:
     """Find gages whose slope over the lateral force is out of the order of their positions."""
     force = regressors[:, 1] if regressors.shape[1] > 1 else np.zeros(len(regressors))
     if np.ptp(force) < 0.2 or force.min() > -0.05 or force.max() < 0.05:
@@ -252,7 +252,7 @@ def _lateral_order(
         f"strain_{gage + 1} {1e6 * coefficients[1, 2, gage] / 3.0:.0f}" for gage in order
     )
     return [
-        Problem(
+        CampaignFault(
             f"campaign.toml, [gages] lateral_m, channels {names}",
             "swapped gages: the lowest strain changes with the lateral force by, across the tire, "
             f"{slopes} microstrain a kN",
@@ -263,9 +263,9 @@ def _lateral_order(
     ]
 
 
-def _unchecked(held: str) -> Problem:
+def _unchecked(held: str) -> CampaignFault:
     """Return the warning that swapped gages would not have been noticed."""
-    return Problem(
+    return CampaignFault(
         "campaign.toml, [gages] lateral_m",
         f"the order of the gages was not checked: the campaign holds {held}",
         "lateral forces of both signs in at least four runs are needed to distinguish the sides",
@@ -291,7 +291,7 @@ def _out_of_order(slopes: FloatArray, error: float) -> list[int]:
 
 def force_sign_findings(
     summaries: Sequence["ForceSign"], header: CampaignHeader
-) -> tuple[list[RunFinding], list[Problem]]:
+) -> tuple[list[RunFinding], list[CampaignFault]]:
     """Compare the signs of a force and of what it follows with the axis system."""
     clear = [item for item in summaries if item.share is not None]
     wrong = [item for item in clear if item.share is not None and item.share > 0.5]
@@ -301,7 +301,7 @@ def force_sign_findings(
     same = signs_of(name, header.axes)
     if 2 * len(wrong) > len(clear):
         return [], [
-            Problem(
+            CampaignFault(
                 "campaign.toml, axes",
                 f"wrong sign: {name} against {by} contradicts axes = {header.axes!r} in "
                 f"{len(wrong)} of {len(clear)} runs with a slip angle ({wrong[0].file} first)",

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from tirelib.campaign.problem import Problem, Severity
+from tirelib.campaign.campaign_fault import CampaignFault, Severity
 
 SHARED_BY = 4
 """From this many runs on, and from half of all, a shared fault gets one line for all of them."""
@@ -23,13 +23,13 @@ class RunFinding:
         The run file.
     channel : str
         Empty for the run as a whole.
-    problem : Problem
+    problem : CampaignFault
     """
 
     key: str
     file: str
     channel: str
-    problem: Problem
+    problem: CampaignFault
 
 
 def finding(
@@ -46,17 +46,17 @@ def finding(
     """Return a finding whose place is `file`, `channel` and, where that helps, `at`."""
     where = ", ".join(part for part in (file, channel and f"channel {channel}", at) if part)
     severity: Severity = "warning" if warning else "error"
-    problem = Problem(where, given, allowed, remedy, severity)
+    problem = CampaignFault(where, given, allowed, remedy, severity)
     return RunFinding(f"{key} {channel} {severity}", file, channel, problem)
 
 
-def gathered(findings: Iterable[RunFinding], n_runs: int) -> list[Problem]:
+def gathered(findings: Iterable[RunFinding], n_runs: int) -> list[CampaignFault]:
     """Return the problems in their order; one that most runs share becomes one line."""
     by_key: dict[str, list[RunFinding]] = {}
     listed = list(findings)
     for item in listed:
         by_key.setdefault(item.key, []).append(item)
-    problems: list[Problem] = []
+    problems: list[CampaignFault] = []
     for item in listed:
         same = by_key[item.key]
         files = list(dict.fromkeys(other.file for other in same))

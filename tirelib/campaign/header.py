@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from tirelib.campaign.campaign_fault import CampaignFault, errors_of
 from tirelib.campaign.model import CampaignHeader, TireGeometry, Tolerance
-from tirelib.campaign.problem import Problem, errors_of
 from tirelib.core.axes import FLIPPED, sign
 from tirelib.core.units import dimensions_of_unit, units_of
 
@@ -38,10 +38,10 @@ class _Reader:
 
     def __init__(self, document: Mapping[str, Any]) -> None:
         self.document = document
-        self.problems: list[Problem] = []
+        self.problems: list[CampaignFault] = []
 
     def fault(self, key: str, given: str, allowed: str, remedy: str) -> None:
-        self.problems.append(Problem(f"{FILE}, {key}", given, allowed, remedy))
+        self.problems.append(CampaignFault(f"{FILE}, {key}", given, allowed, remedy))
 
     def table(self, key: str) -> Mapping[str, Any]:
         value = self.document.get(key, {})
@@ -113,14 +113,14 @@ class _Reader:
         return None
 
 
-def parse_header(folder: Path) -> tuple[CampaignHeader | None, list[Problem]]:
+def parse_header(folder: Path) -> tuple[CampaignHeader | None, list[CampaignFault]]:
     """Read ``campaign.toml`` of a folder.
 
     Returns
     -------
     header : CampaignHeader or None
         None when the runs could not be read by it: format, axes, free radius or gages are wrong.
-    problems : list of Problem
+    problems : list of CampaignFault
         Every fault found, in reading order.
     """
     document, problem = _document(folder)
@@ -142,28 +142,30 @@ def parse_header(folder: Path) -> tuple[CampaignHeader | None, list[Problem]]:
     return header, reader.problems
 
 
-def _blocks(problem: Problem) -> bool:
+def _blocks(problem: CampaignFault) -> bool:
     """Return whether the runs cannot be interpreted as long as this key is wrong."""
     keys = ("format", "axes", "[gages]", "[tire] free_radius_m")
     return problem.where.startswith(tuple(f"{FILE}, {key}" for key in keys))
 
 
-def _document(folder: Path) -> tuple[dict[str, Any] | None, Problem | None]:
+def _document(folder: Path) -> tuple[dict[str, Any] | None, CampaignFault | None]:
     try:
         return tomllib.loads((folder / FILE).read_text(encoding="utf-8-sig")), None
     except OSError as error:
-        return None, Problem(
+        return None, CampaignFault(
             FILE,
             f"it cannot be read ({error.strerror})",
             "every campaign needs one",
             "write it or name the campaign's own folder",
         )
     except UnicodeDecodeError as error:
-        return None, Problem(
+        return None, CampaignFault(
             FILE, f"byte {error.start} is not UTF-8", "TOML is UTF-8", "save it as UTF-8"
         )
     except tomllib.TOMLDecodeError as error:
-        return None, Problem(FILE, f"not TOML: {error}", "valid TOML is needed", "correct it there")
+        return None, CampaignFault(
+            FILE, f"not TOML: {error}", "valid TOML is needed", "correct it there"
+        )
 
 
 def _check_format(reader: _Reader) -> None:
@@ -276,7 +278,7 @@ def _check_keys(reader: _Reader) -> None:
             if key not in known:
                 where = f"[{table}] {key}" if table else key
                 reader.problems.append(
-                    Problem(
+                    CampaignFault(
                         f"{FILE}, {where}",
                         "the key is unknown and is ignored",
                         f"known keys are {', '.join(sorted(known))}",

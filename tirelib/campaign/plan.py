@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.model import KINDS, RunPlan
-from tirelib.campaign.problem import Problem
 from tirelib.core.axes import sign
 from tirelib.core.units import from_si, to_si
 
@@ -45,14 +45,14 @@ _START = "start_s"
 _NO_EXTRA = frozenset((*REQUIRED, _START, *(column.name for column in ROAD)))
 
 
-def parse_plans(folder: Path, axes: str) -> tuple[tuple[RunPlan, ...], list[Problem]]:
+def parse_plans(folder: Path, axes: str) -> tuple[tuple[RunPlan, ...], list[CampaignFault]]:
     """Read ``runs.csv`` of a folder whose data are in `axes`.
 
     Returns
     -------
     plans : tuple of RunPlan
         Plans of the rows without a fault, in file order.
-    problems : list of Problem
+    problems : list of CampaignFault
         Every fault found, in reading order.
     """
     try:
@@ -60,7 +60,7 @@ def parse_plans(folder: Path, axes: str) -> tuple[tuple[RunPlan, ...], list[Prob
             table = list(csv.reader(stream))
     except OSError as error:
         return (), [
-            Problem(
+            CampaignFault(
                 FILE,
                 f"it cannot be read ({error.strerror})",
                 "every campaign needs one",
@@ -69,7 +69,7 @@ def parse_plans(folder: Path, axes: str) -> tuple[tuple[RunPlan, ...], list[Prob
         ]
     except (UnicodeDecodeError, csv.Error) as error:
         return (), [
-            Problem(
+            CampaignFault(
                 FILE,
                 f"not a text table: {error}",
                 "comma-separated UTF-8 is needed",
@@ -89,17 +89,17 @@ def parse_plans(folder: Path, axes: str) -> tuple[tuple[RunPlan, ...], list[Prob
     problems += _duplicates(table, columns)
     if len(table) < 2:
         problems.append(
-            Problem(FILE, "no run is listed", "one row a run is needed", "add the runs")
+            CampaignFault(FILE, "no run is listed", "one row a run is needed", "add the runs")
         )
     return tuple(plans), problems
 
 
-def _separator_problems(columns: list[str]) -> list[Problem]:
+def _separator_problems(columns: list[str]) -> list[CampaignFault]:
     """Return a fault where the separator of the columns is not a comma."""
     for mark, words in ((";", "semicolons"), ("\t", "tabs"), ("|", "bars")):
         if len(columns) == 1 and {"run", "file"} <= {c.strip() for c in columns[0].split(mark)}:
             return [
-                Problem(
+                CampaignFault(
                     f"{FILE}, line 1",
                     f"the columns are separated by {words} ({mark!r})",
                     "commas are needed, and a point in decimal numbers",
@@ -109,9 +109,9 @@ def _separator_problems(columns: list[str]) -> list[Problem]:
     return []
 
 
-def _column_problems(columns: list[str]) -> list[Problem]:
+def _column_problems(columns: list[str]) -> list[CampaignFault]:
     problems = [
-        Problem(
+        CampaignFault(
             f"{FILE}, line 1",
             f"column {name!r} is missing",
             f"the columns {', '.join(REQUIRED)} are needed",
@@ -121,7 +121,7 @@ def _column_problems(columns: list[str]) -> list[Problem]:
         if name not in columns
     ]
     problems += [
-        Problem(
+        CampaignFault(
             f"{FILE}, line 1",
             f"column {name!r} occurs twice",
             "each column may occur once",
@@ -135,11 +135,11 @@ def _column_problems(columns: list[str]) -> list[Problem]:
 
 def _parse_row(
     line: int, columns: list[str], cells: list[str], axes: str
-) -> tuple[RunPlan | None, list[Problem]]:
+) -> tuple[RunPlan | None, list[CampaignFault]]:
     where = f"{FILE}, line {line}"
     if len(cells) != len(columns):
         return None, [
-            Problem(
+            CampaignFault(
                 where,
                 f"{len(cells)} cells are given",
                 f"{len(columns)} columns are declared",
@@ -147,13 +147,13 @@ def _parse_row(
             )
         ]
     row = {name: cell.strip() for name, cell in zip(columns, cells, strict=True)}
-    problems: list[Problem] = []
+    problems: list[CampaignFault] = []
     run = _run_number(where, row["run"], problems)
     file = _file_name(where, row["file"], problems)
     kind = row["kind"]
     if kind not in KINDS:
         problems.append(
-            Problem(
+            CampaignFault(
                 f"{where}, kind",
                 f"{kind!r} is given",
                 f"{', '.join(KINDS)} are allowed",
@@ -181,11 +181,11 @@ def _parse_row(
     return plan, problems
 
 
-def _run_number(where: str, cell: str, problems: list[Problem]) -> int | None:
+def _run_number(where: str, cell: str, problems: list[CampaignFault]) -> int | None:
     if cell.isdecimal():
         return int(cell)
     problems.append(
-        Problem(
+        CampaignFault(
             f"{where}, run",
             f"{cell!r} is given",
             "a whole number, 0 or more, is needed",
@@ -195,11 +195,11 @@ def _run_number(where: str, cell: str, problems: list[Problem]) -> int | None:
     return None
 
 
-def _file_name(where: str, cell: str, problems: list[Problem]) -> str:
+def _file_name(where: str, cell: str, problems: list[CampaignFault]) -> str:
     path = PurePosixPath(cell)
     if not cell or path.is_absolute() or ".." in path.parts:
         problems.append(
-            Problem(
+            CampaignFault(
                 f"{where}, file",
                 f"{cell!r} is given",
                 "a file inside the folder is needed",
@@ -209,7 +209,7 @@ def _file_name(where: str, cell: str, problems: list[Problem]) -> str:
     return cell
 
 
-def _number(where: str, cell: str, problems: list[Problem]) -> float:
+def _number(where: str, cell: str, problems: list[CampaignFault]) -> float:
     """Return the number in a cell, NaN for an empty one; a fault is noted and gives NaN."""
     if not cell:
         return math.nan
@@ -219,7 +219,7 @@ def _number(where: str, cell: str, problems: list[Problem]) -> float:
         value = math.nan
     if not math.isfinite(value):
         problems.append(
-            Problem(
+            CampaignFault(
                 where,
                 f"{cell!r} is given",
                 "a finite number is needed",
@@ -230,7 +230,7 @@ def _number(where: str, cell: str, problems: list[Problem]) -> float:
 
 
 def _set_point(
-    where: str, cell: str, kind: str, column: _Column, axes: str, problems: list[Problem]
+    where: str, cell: str, kind: str, column: _Column, axes: str, problems: list[CampaignFault]
 ) -> float:
     place = f"{where}, {column.name}"
     before = len(problems)
@@ -240,7 +240,7 @@ def _set_point(
     if math.isnan(value):
         if kind != "sweep":
             problems.append(
-                Problem(
+                CampaignFault(
                     place,
                     "the set point is empty",
                     "only a sweep may leave it empty",
@@ -250,7 +250,7 @@ def _set_point(
         return math.nan
     if not column.low <= value <= column.high:
         problems.append(
-            Problem(
+            CampaignFault(
                 place,
                 f"{value:g} {column.unit} is not plausible",
                 f"{column.low:g} .. {column.high:g} {column.unit} is allowed",
@@ -268,9 +268,9 @@ def _extra(cell: str) -> float | str:
         return cell
 
 
-def _duplicates(table: list[list[str]], columns: list[str]) -> list[Problem]:
+def _duplicates(table: list[list[str]], columns: list[str]) -> list[CampaignFault]:
     """Return the run numbers and the files that occur in more than one row."""
-    problems: list[Problem] = []
+    problems: list[CampaignFault] = []
     for name, allowed in (
         ("run", "each run has its own number"),
         ("file", "each run has its own file"),
@@ -281,7 +281,7 @@ def _duplicates(table: list[list[str]], columns: list[str]) -> list[Problem]:
             if place < len(cells) and cells[place].strip():
                 lines.setdefault(cells[place].strip(), []).append(line)
         problems += [
-            Problem(
+            CampaignFault(
                 f"{FILE}, lines {', '.join(map(str, where))}",
                 f"{name} {value} is listed {len(where)} times",
                 allowed,

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from tirelib.campaign import header as header_file
 from tirelib.campaign import plan as plan_file
+from tirelib.campaign.campaign_fault import raise_errors
 from tirelib.campaign.model import CampaignHeader, Run, RunPlan
-from tirelib.campaign.problem import raise_errors
 from tirelib.campaign.runfile import load_run
 from tirelib.core.errors import FormatError
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tirelib.campaign.problem import Problem, raise_errors
+from tirelib.campaign.campaign_fault import CampaignFault, raise_errors
 from tirelib.core.axes import FLIPPED, sign
 from tirelib.core.errors import FormatError
 from tirelib.core.held import HELD
@@ -86,10 +86,10 @@ def read_recording(path: str | Path) -> Recording:
     """
     folder = Path(path)
     document = _document(folder)
-    problems: list[Problem] = []
+    problems: list[CampaignFault] = []
 
     def fault(key: str, given: str, allowed: str, remedy: str) -> None:
-        problems.append(Problem(f"{folder / FILE}, {key}", given, allowed, remedy))
+        problems.append(CampaignFault(f"{folder / FILE}, {key}", given, allowed, remedy))
 
     if document.get("format") != FORMAT:
         given = repr(document["format"]) if "format" in document else "the key is missing"

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from tirelib.campaign.campaign_fault import CampaignFault, raise_errors
 from tirelib.campaign.mdf import Channel, Group, read_mdf
 from tirelib.campaign.model import CampaignHeader, FloatArray, Run, RunPlan
-from tirelib.campaign.problem import Problem, raise_errors
 from tirelib.campaign.timebase import gage_time_problems, rig_time_problems
 from tirelib.core.axes import sign
 from tirelib.core.errors import FormatError, UnitError
@@ -36,19 +36,19 @@ def load_run(folder: Path, plan: RunPlan, header: CampaignHeader) -> Run:
 
 def inspect_run(
     folder: Path, plan: RunPlan, header: CampaignHeader
-) -> tuple[Run | None, list[Problem]]:
+) -> tuple[Run | None, list[CampaignFault]]:
     """Read the file of one run and keep every fault instead of raising.
 
     Returns
     -------
     run : Run or None
         What could be read, without the channels that have a fault; None when nothing could.
-    problems : list of Problem
+    problems : list of CampaignFault
     """
     try:
         groups = read_mdf(folder / plan.file)
     except FormatError as error:
-        return None, [Problem.at(plan.file, fault) for fault in error.faults]
+        return None, [CampaignFault.at(plan.file, fault) for fault in error.faults]
     file = _RunFile(plan, header)
     strain_group, rig_group = file.split(groups)
     strain = file.strain(strain_group) if strain_group else None
@@ -75,7 +75,7 @@ class _RunFile:
     def __init__(self, plan: RunPlan, header: CampaignHeader) -> None:
         self.plan = plan
         self.header = header
-        self.problems: list[Problem] = []
+        self.problems: list[CampaignFault] = []
 
     def split(self, groups: list[Group]) -> tuple[Group | None, Group | None]:
         """Return the group at gage rate, if any, and the one at rig rate, if any."""
@@ -113,7 +113,7 @@ class _RunFile:
     def unread_at_gage_rate(self, group: Group) -> None:
         """Warn of channels beside the strain that have no place in a Run."""
         self.problems += [
-            Problem(
+            CampaignFault(
                 f"{self.plan.file}, channel {channel.name}",
                 "it is recorded at the rate of the gages, so it is left out",
                 "only strain_N and trigger belong there; rig quantities need their own group",
@@ -225,7 +225,7 @@ class _RunFile:
             )
             return
         self.problems.append(
-            Problem(
+            CampaignFault(
                 f"{self.plan.file}, channel {channel.name}",
                 f"its unit {channel.unit!r} is unknown, so the channel is left out",
                 "a unit of tirelib.core.units is needed",
@@ -261,7 +261,7 @@ class _RunFile:
 
     def fault(self, channel: str, given: str, allowed: str, remedy: str) -> None:
         where = f"{self.plan.file}, channel {channel}" if channel else self.plan.file
-        self.problems.append(Problem(where, given, allowed, remedy))
+        self.problems.append(CampaignFault(where, given, allowed, remedy))
 
 
 def _is_gage(channel: Channel) -> bool:

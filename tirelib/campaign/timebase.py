@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.model import FloatArray
-from tirelib.campaign.problem import Problem
 
 STEP_TOLERANCE = 0.3
 """A step between gage samples may be this much longer or shorter than 1 / rate."""
@@ -12,7 +12,7 @@ RATE_TOLERANCE = 1e-3
 """Relative. A logger's quartz is a hundred times better; a wrong rate_hz far worse."""
 
 
-def gage_time_problems(file: str, times: FloatArray, rate: float) -> list[Problem]:
+def gage_time_problems(file: str, times: FloatArray, rate: float) -> list[CampaignFault]:
     """Return the faults of the gages' clock.
 
     Parameters
@@ -26,7 +26,7 @@ def gage_time_problems(file: str, times: FloatArray, rate: float) -> list[Proble
     where = f"{file}, time of the gages"
     if times.size < 2:
         return [
-            Problem(
+            CampaignFault(
                 where, f"{times.size} samples", "two turns of the wheel are needed", "record longer"
             )
         ]
@@ -43,7 +43,7 @@ def gage_time_problems(file: str, times: FloatArray, rate: float) -> list[Proble
         first = int(gaps[0])
         lost = round(float(np.sum(steps[gaps] / usual - 1.0)))
         return [
-            Problem(
+            CampaignFault(
                 where,
                 f"{gaps.size} gap(s), the first of {1e3 * steps[first]:.3g} ms after sample "
                 f"{first} (t = {times[first]:.4f} s), about {lost} samples are lost",
@@ -54,7 +54,7 @@ def gage_time_problems(file: str, times: FloatArray, rate: float) -> list[Proble
     if short.size:
         first = int(short[0])
         return [
-            Problem(
+            CampaignFault(
                 where,
                 f"not uniform: a step of {1e3 * steps[first]:.3g} ms after sample {first} "
                 f"(t = {times[first]:.4f} s), the usual step is {1e3 * usual:.3g} ms",
@@ -68,16 +68,16 @@ def gage_time_problems(file: str, times: FloatArray, rate: float) -> list[Proble
     return []
 
 
-def rig_time_problems(file: str, times: FloatArray) -> list[Problem]:
+def rig_time_problems(file: str, times: FloatArray) -> list[CampaignFault]:
     """Return the faults of the rig's clock: it must increase, but may pause."""
     return _growth_problems(f"{file}, time of the rig quantities", times)
 
 
-def _growth_problems(where: str, times: FloatArray) -> list[Problem]:
+def _growth_problems(where: str, times: FloatArray) -> list[CampaignFault]:
     broken = np.flatnonzero(~np.isfinite(times))
     if broken.size:
         return [
-            Problem(
+            CampaignFault(
                 where,
                 f"no finite time at sample {int(broken[0])}",
                 "each sample needs its time",
@@ -89,7 +89,7 @@ def _growth_problems(where: str, times: FloatArray) -> list[Problem]:
         return []
     first = int(back[0])
     return [
-        Problem(
+        CampaignFault(
             where,
             f"the time does not increase after sample {first} ({times[first]:.6g} s, then "
             f"{times[first + 1]:.6g} s), {back.size} time(s) in all",
@@ -99,8 +99,8 @@ def _growth_problems(where: str, times: FloatArray) -> list[Problem]:
     ]
 
 
-def _rate_problem(where: str, measured: float, rate: float) -> Problem:
-    return Problem(
+def _rate_problem(where: str, measured: float, rate: float) -> CampaignFault:
+    return CampaignFault(
         where,
         f"the samples come at {measured:.6g} Hz",
         f"campaign.toml declares {rate:.6g} Hz",

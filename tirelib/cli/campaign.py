@@ -11,8 +11,8 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.model import Run
-from tirelib.campaign.problem import Problem
 from tirelib.campaign.read import Campaign, read_campaign
 from tirelib.cli.common import NEW_FILE, NEW_FOLDER, write_json
 from tirelib.cli.options import json_option
@@ -70,7 +70,7 @@ def check(context: click.Context, folder: Path, json_file: Path | None) -> None:
     context.exit(1 if errors else 0)
 
 
-def _print_problems(folder: Path, problems: list[Problem], errors: int) -> None:
+def _print_problems(folder: Path, problems: list[CampaignFault], errors: int) -> None:
     console = Console(highlight=False, soft_wrap=True)
     for problem in problems:
         colour = "red" if problem.severity == "error" else "yellow"
@@ -92,7 +92,7 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def check_document(folder: Path, problems: list[Problem]) -> dict[str, Any]:
+def check_document(folder: Path, problems: list[CampaignFault]) -> dict[str, Any]:
     """Return what ``check --json`` writes."""
     errors = sum(problem.severity == "error" for problem in problems)
     return {

@@ -19,10 +19,10 @@ from hashlib import sha256
 from pathlib import Path
 from threading import Lock
 
+from tirelib.campaign.campaign_fault import CampaignFault, errors_of
 from tirelib.campaign.header import parse_header
 from tirelib.campaign.mdf_header import started_at
 from tirelib.campaign.plan import parse_plans
-from tirelib.campaign.problem import Problem, errors_of
 from tirelib.campaign.recording import FILE as RECORDING
 from tirelib.campaign.recording import read_recording
 from tirelib.core.errors import Fault, FormatError, TirelibError
@@ -334,7 +334,7 @@ class _About:
     length: float
     begins: Mapping[int, float]
     tags: Mapping[str, str]
-    faults: tuple[Problem, ...] = ()
+    faults: tuple[CampaignFault, ...] = ()
 
 
 def _about(folder: Path) -> _About:

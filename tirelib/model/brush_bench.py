@@ -36,7 +36,8 @@ UNITS = {
     "Mz_offset": 2.0,
 }
 """Sizes of what is moved by addition; the others are moved by a factor."""
-STEP = 1e-5
+COORDINATE_STEP = 1e-5
+"""Move of a coordinate by which slopes are taken."""
 DEAD = 1e-5
 
 
@@ -97,8 +98,8 @@ class BrushBench:
         """Return the forces with parameters moved by z, and their slopes by them."""
         here = self.moved(z, *changes)
         rows = []
-        for step in STEP * np.eye(z.size):
-            rows.append((self.moved(z + step, *changes) - here).ravel() / STEP)
+        for step in COORDINATE_STEP * np.eye(z.size):
+            rows.append((self.moved(z + step, *changes) - here).ravel() / COORDINATE_STEP)
         return here, np.stack(rows)
 
     def words(self, size: float) -> str:

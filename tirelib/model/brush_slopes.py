@@ -15,7 +15,7 @@ from tirelib.effects.brush_state import BrushState
 from tirelib.model.brush import brush_forces
 from tirelib.physics.brush.predict import PointForces
 
-STEP = 1e-6
+STATE_STEP = 1e-6
 """Step of a derivative, over the size of what it moves."""
 SIZES = {"flatness": 1.0, "slip_angle": 0.1, "slip_ratio": 0.1}
 """Sizes of fields that may be zero everywhere."""
@@ -44,7 +44,7 @@ class StateSlopes:
         self.state, self.turn, self.quantity = state, turn, quantity
         self._kept: dict[str, FloatArray] = {}
         self._here = self._rigid(state, turn)
-        self._by_turn = (self._rigid(state, turn + STEP) - self._here) / STEP
+        self._by_turn = (self._rigid(state, turn + STATE_STEP) - self._here) / STATE_STEP
         self._give = 1.0 - state.yaw_compliance * self._by_turn[1]
 
     def toward(self, other: BrushState) -> FloatArray:
@@ -68,7 +68,7 @@ class StateSlopes:
         old: FloatArray = getattr(self.state, name)
         size = max(float(np.abs(old).max()), SIZES.get(name, 0.0)) or 1.0
         # toward zero: a field may be at the end of what is allowed
-        step = STEP * size * np.where(old > 0.0, -1.0, 1.0)
+        step = STATE_STEP * size * np.where(old > 0.0, -1.0, 1.0)
         moved = self._rigid(self.state.but(**{name: old + step}), self.turn)
         force, moment = (moved - self._here) / step
         turned = self.state.yaw_compliance * moment / self._give

@@ -12,7 +12,7 @@ from tirelib.physics.rolling.constants import Constants
 from tirelib.physics.rolling.gage import Gage, same_place, strain, strain_along
 from tirelib.physics.rolling.solve import Rolling, slopes
 
-STEP = 1e-6
+CONSTANT_STEP = 1e-6
 """Relative change of what the ring is made of, of which the residual's slope is taken."""
 FRICTION = 1.0
 """Friction coefficient between tread and road. A wheel that rolls freely slides only where its

@@ -10,7 +10,7 @@ from tirelib.core.errors import ParameterError
 from tirelib.effects.state import READ, Operating, State
 from tirelib.model.base import Coordinate, smoothed
 from tirelib.model.chain import Change, Changes, Course, course, filtered, strained
-from tirelib.model.rolled import STEP, RolledSlopes, rolled_slopes
+from tirelib.model.rolled import CONSTANT_STEP, RolledSlopes, rolled_slopes
 from tirelib.model.solution import (
     Solution,
     Values,
@@ -84,11 +84,11 @@ def by_values(found: Solution, free: Sequence[Coordinate]) -> SolutionSlopes:
     own, _ = split(v, p, found.changes)
     there: list[tuple[Values, Operating, Sequence[Change]]] = []
     for coordinate in free:
-        moved = coordinate.moved(np.asarray(v[coordinate.name], dtype=float), STEP)
+        moved = coordinate.moved(np.asarray(v[coordinate.name], dtype=float), CONSTANT_STEP)
         there.append(({**v, coordinate.name: moved}, p, own))
-    there.append((v, replace(p, load=p.load * (1.0 + STEP)), own))
-    there.append((v, replace(p, pressure=p.pressure * (1.0 + STEP)), own))
-    shown, by = _towards(found, there, STEP, own)
+    there.append((v, replace(p, load=p.load * (1.0 + CONSTANT_STEP)), own))
+    there.append((v, replace(p, pressure=p.pressure * (1.0 + CONSTANT_STEP)), own))
+    shown, by = _towards(found, there, CONSTANT_STEP, own)
     return SolutionSlopes(_through_gage(found, shown), by)
 
 

@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from tirelib.campaign import FloatArray, Problem
+from tirelib.campaign import CampaignFault, FloatArray
 from tirelib.campaign.mdf import Group
 
 
-def the_one(problems: list[Problem], severity: str = "error") -> str:
+def the_one(problems: list[CampaignFault], severity: str = "error") -> str:
     """Return the only problem as text; fail and show them when there are others."""
     assert [p.severity for p in problems] == [severity], "\n".join(map(str, problems))
     assert problems[0].where

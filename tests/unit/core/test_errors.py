@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import tirelib
+from tirelib.campaign.campaign_fault import CampaignFault, raise_errors
 from tirelib.campaign.mdf import read_mdf
-from tirelib.campaign.problem import Problem, raise_errors
 from tirelib.core.errors import ConvergenceError, Fault, FormatError, ParameterError, TirelibError
 from tirelib.core.units import to_si
 from tirelib.physics.ring.ring import Ring
@@ -37,9 +37,9 @@ def test_a_text_alone_has_no_parts() -> None:
 
 
 def test_a_problem_is_a_fault_at_its_place_and_a_folder_goes_before_it() -> None:
-    problem = Problem.at("runs.csv, row 3", THERE)
+    problem = CampaignFault.at("runs.csv, row 3", THERE)
     with pytest.raises(FormatError) as raised:
-        raise_errors([problem, Problem("x", "a", "b", "c", "warning")], prefix="set1/")
+        raise_errors([problem, CampaignFault("x", "a", "b", "c", "warning")], prefix="set1/")
     (fault,) = raised.value.faults
     assert (fault.where, fault.given) == ("set1/runs.csv, row 3", "no unit; at all")
     assert str(raised.value) == f"set1/{problem}"

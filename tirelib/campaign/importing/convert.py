@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.finding import RunFinding
 from tirelib.campaign.importing.columns import Column, Table
 from tirelib.campaign.importing.defects import Clock
@@ -19,7 +20,6 @@ from tirelib.campaign.importing.rules import ImportMap
 from tirelib.campaign.importing.signs import sign_findings
 from tirelib.campaign.model import BoolArray, FloatArray
 from tirelib.campaign.plan import SET_POINTS
-from tirelib.campaign.problem import Problem
 from tirelib.campaign.timebase import gage_time_problems
 from tirelib.core.units import from_si, to_si
 
@@ -240,7 +240,7 @@ class _Conversion(MappedTable):
             if wrong.any():
                 count = int(np.count_nonzero(wrong))
                 first = int(np.flatnonzero(wrong)[0])
-                problem = Problem(
+                problem = CampaignFault(
                     f"{source}, time",
                     f"{given} in {self.table.places(rows[wrong])} (t = {inside[first]:.6g} s"
                     + (f", {count} in all)" if count > 1 else ")"),
@@ -259,7 +259,7 @@ class _Conversion(MappedTable):
             inside = column.values if column.constant else column.values[span]
             low, high = (float(inside.min()), float(inside.max())) if inside.size else (np.nan,) * 2
             if not high - low <= _SAME * max(abs(low), abs(high)):
-                problem = Problem(
+                problem = CampaignFault(
                     f"{source}, column {column.name!r} ({target.name})",
                     f"the set point goes from {low:g} to {high:g} within the run",
                     "one value a run is needed",

@@ -15,6 +15,7 @@ import numpy as np
 
 from tirelib.campaign import header as header_file
 from tirelib.campaign import plan as plan_file
+from tirelib.campaign.campaign_fault import CampaignFault, errors_of
 from tirelib.campaign.check import check_campaign
 from tirelib.campaign.finding import RunFinding, gathered
 from tirelib.campaign.importing.convert import Piece, clocks_of, convert
@@ -30,7 +31,6 @@ from tirelib.campaign.importing.plans import (
 from tirelib.campaign.importing.rules import ImportMap
 from tirelib.campaign.importing.unmapped import Unmapped
 from tirelib.campaign.model import CampaignHeader, Run, RunPlan
-from tirelib.campaign.problem import Problem, errors_of
 from tirelib.campaign.timebase import gage_time_problems
 from tirelib.campaign.write import write_campaign
 from tirelib.core.errors import FormatError, ParameterError
@@ -51,7 +51,7 @@ class ImportReport:
     runs : tuple of ImportedRun
     notes : tuple of str
         What was found out and is worth knowing.
-    warnings : tuple of Problem
+    warnings : tuple of CampaignFault
         Warnings of the map, and of the check of the campaign.
     """
 
@@ -59,7 +59,7 @@ class ImportReport:
     header: CampaignHeader
     runs: tuple[ImportedRun, ...]
     notes: tuple[str, ...]
-    warnings: tuple[Problem, ...]
+    warnings: tuple[CampaignFault, ...]
 
 
 def import_campaign(
@@ -248,7 +248,7 @@ def _old_files(folder: Path) -> list[Path]:
 
 def _checked(
     written: Path, folder: Path, rules: ImportMap, imported: Sequence[ImportedRun]
-) -> list[Problem]:
+) -> list[CampaignFault]:
     """Return the warnings of the check; raise its errors in terms of the files and the map."""
     sources = {item.plan.file: item.source for item in imported}
     problems = [_translated(p, sources, rules.file) for p in check_campaign(written)]
@@ -265,7 +265,7 @@ def _checked(
     return problems
 
 
-def _translated(problem: Problem, sources: dict[str, str], map_file: str) -> Problem:
+def _translated(problem: CampaignFault, sources: dict[str, str], map_file: str) -> CampaignFault:
     def translated(text: str) -> str:
         for file, source in sources.items():
             text = text.replace(file, source)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from tirelib.campaign.campaign_fault import CampaignFault, errors_of, raise_errors
 from tirelib.campaign.importing.columns import did_you_mean
 from tirelib.campaign.importing.defects import CHOICES, Defects
 from tirelib.campaign.importing.mapheader import GAGE_TIME, header_of, strain_number
@@ -19,7 +20,6 @@ from tirelib.campaign.importing.mapreader import (
 from tirelib.campaign.importing.rules import ChannelRule, ImportMap, RunEntry, SetPointRule
 from tirelib.campaign.model import KINDS, CampaignHeader, TireGeometry
 from tirelib.campaign.plan import SET_POINTS
-from tirelib.campaign.problem import Problem, errors_of, raise_errors
 from tirelib.core.errors import UnitError
 from tirelib.core.units import QUANTITIES, to_si
 
@@ -65,14 +65,14 @@ def read_map(path: str | Path, name: str = "import") -> ImportMap:
     return rules
 
 
-def parse_map(path: str | Path, name: str) -> tuple[ImportMap, list[Problem]]:
+def parse_map(path: str | Path, name: str) -> tuple[ImportMap, list[CampaignFault]]:
     """Read an import map and keep its faults, so that the files can be looked at as well.
 
     Returns
     -------
     rules : ImportMap
         What is right in it; `ImportMap.sound` is False when anything is wrong.
-    problems : list of Problem
+    problems : list of CampaignFault
 
     Raises
     ------

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 import tomli_w
 
 from tirelib.campaign import header as header_file
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.model import CampaignHeader
-from tirelib.campaign.problem import Problem
 
 GAGE_TIME = "gage_time"
 """Quantity of a map: the clock of the gages, where they have one of their own."""
@@ -39,7 +39,7 @@ def is_gage(quantity: str) -> bool:
 
 def header_of(
     file: str, document: Mapping[str, Any], channels: Mapping[str, _Rule], name: str
-) -> tuple[CampaignHeader | None, list[Problem]]:
+) -> tuple[CampaignHeader | None, list[CampaignFault]]:
     """Read name, axes, tire, gages, tolerance and rig of a map as ``campaign.toml`` has them.
 
     A tire without a name gets that of the campaign, gages without a unit that of strain_1; a rate
@@ -48,7 +48,7 @@ def header_of(
     Returns
     -------
     header : CampaignHeader or None
-    problems : list of Problem
+    problems : list of CampaignFault
     """
     given = {key: document[key] for key in ("name", "axes", *_COPIED) if key in document}
     given = {"format": header_file.FORMAT, "name": name, **given}
@@ -78,7 +78,7 @@ def _gage_problems(
     document: Mapping[str, Any],
     channels: Mapping[str, _Rule],
     header: CampaignHeader | None,
-) -> list[Problem]:
+) -> list[CampaignFault]:
     """Compare the strain channels with the positions of the gages."""
     numbers = sorted(n for quantity in channels if (n := strain_number(quantity)) is not None)
     mapped = ", ".join(f"strain_{number}" for number in numbers)
@@ -88,12 +88,14 @@ def _gage_problems(
             return []
         given = f"{mapped or alone[0]} is mapped, but the table is missing"
         allowed = "strain_1, ... and lateral_m with a position for each belong together"
-        return [Problem(f"{file}, [gages]", given, allowed, "add lateral_m, or drop the channel")]
+        return [
+            CampaignFault(f"{file}, [gages]", given, allowed, "add lateral_m, or drop the channel")
+        ]
     count = len(header.gage_lateral) if header is not None else None
     if count is None or numbers == list(range(1, count + 1)):
         return []
     return [
-        Problem(
+        CampaignFault(
             f"{file}, [channels]",
             f"{len(numbers)} strain channels are mapped ({mapped or 'none'})",
             f"[gages] lateral_m declares {count}, strain_1 to strain_{count}",

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.finding import RunFinding
 from tirelib.campaign.importing.columns import Column, Table, did_you_mean
 from tirelib.campaign.importing.mapheader import GAGE_TIME
 from tirelib.campaign.importing.rules import ChannelRule, ImportMap
 from tirelib.campaign.model import FloatArray
-from tirelib.campaign.problem import Problem
 from tirelib.core.axes import sign
 from tirelib.core.errors import UnitError
 from tirelib.core.units import dimensions_of_unit, to_si
@@ -26,7 +26,7 @@ class MappedTable:
     def fault(self, key: str, where: str, given: str, allowed: str, remedy: str) -> None:
         """Note a fault; `where` is a column or empty."""
         place = f"{self.table.file}, {where}" if where else self.table.file
-        problem = Problem(place, given, allowed, remedy)
+        problem = CampaignFault(place, given, allowed, remedy)
         self.found.append(RunFinding(f"{key} {where}", self.table.file, where, problem))
 
     def named(self, name: str, purpose: str) -> Column | None:

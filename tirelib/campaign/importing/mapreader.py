@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.importing.columns import did_you_mean
 from tirelib.campaign.importing.delimited import CsvOptions
-from tirelib.campaign.problem import Problem
 from tirelib.core.errors import FormatError
 
 FORMAT = "tirelib-map/1"
@@ -20,11 +20,11 @@ class MapReader:
     def __init__(self, file: str, document: Mapping[str, Any]) -> None:
         self.file = file
         self.document = document
-        self.problems: list[Problem] = []
+        self.problems: list[CampaignFault] = []
 
     def fault(self, key: str, given: str, allowed: str, remedy: str) -> None:
         """Note a fault at a key."""
-        self.problems.append(Problem(f"{self.file}, {key}", given, allowed, remedy))
+        self.problems.append(CampaignFault(f"{self.file}, {key}", given, allowed, remedy))
 
     def table(self, key: str) -> Mapping[str, Any]:
         """Return a table of the document, empty when it is missing or none."""

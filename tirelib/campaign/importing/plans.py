@@ -7,11 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.importing.convert import Piece
 from tirelib.campaign.importing.rules import ImportMap
 from tirelib.campaign.model import RunPlan
 from tirelib.campaign.plan import SET_POINTS
-from tirelib.campaign.problem import Problem
 from tirelib.core.axes import sign
 from tirelib.core.units import from_si, to_si
 
@@ -102,14 +102,14 @@ def with_starts(imported: Sequence[ImportedRun]) -> list[ImportedRun]:
     return [replace(item, plan=replace(item.plan, start=item.begin)) for item in imported]
 
 
-def plan_problems(imported: Sequence[ImportedRun], rules: ImportMap) -> list[Problem]:
+def plan_problems(imported: Sequence[ImportedRun], rules: ImportMap) -> list[CampaignFault]:
     """Return run numbers that come twice, entries for no run, and set points that are missing."""
-    problems: list[Problem] = []
+    problems: list[CampaignFault] = []
     first: dict[int, str] = {}
     for item in imported:
         if item.plan.run in first:
             problems.append(
-                Problem(
+                CampaignFault(
                     item.source,
                     f"run {item.plan.run} is in {first[item.plan.run]} already",
                     "each run has its own number",
@@ -120,7 +120,7 @@ def plan_problems(imported: Sequence[ImportedRun], rules: ImportMap) -> list[Pro
     for run, entry in rules.runs.items():
         if first and run not in first and not entry.skip:
             problems.append(
-                Problem(
+                CampaignFault(
                     f"{rules.file}, [runs.{run}]",
                     "there is no such run",
                     f"the runs are {_shown(list(first))}",
@@ -135,7 +135,7 @@ def plan_problems(imported: Sequence[ImportedRun], rules: ImportMap) -> list[Pro
         ]
         if empty:
             problems.append(
-                Problem(
+                CampaignFault(
                     f"{rules.file}, {column.name}",
                     f"no set point for run(s) {_shown(empty)}, no sweep",
                     "only a sweep may leave it empty",

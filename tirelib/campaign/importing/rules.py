@@ -4,11 +4,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.importing.defects import Defects
 from tirelib.campaign.importing.delimited import CsvOptions
 from tirelib.campaign.importing.mapheader import GAGE_TIME
 from tirelib.campaign.model import CampaignHeader
-from tirelib.campaign.problem import Problem
 from tirelib.core.units import dimension_of
 
 
@@ -104,7 +104,7 @@ class ImportMap:
     csv : CsvOptions
     defects : Defects
         What is done with defects of the recordings.
-    warnings : tuple of Problem
+    warnings : tuple of CampaignFault
     sound : bool
         False when the map has a fault; then axes and set points mean nothing.
     """
@@ -118,5 +118,5 @@ class ImportMap:
     runs: Mapping[int, RunEntry]
     csv: CsvOptions
     defects: Defects
-    warnings: tuple[Problem, ...] = ()
+    warnings: tuple[CampaignFault, ...] = ()
     sound: bool = True

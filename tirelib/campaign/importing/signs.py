@@ -4,12 +4,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.check_order import FOLLOWS, force_sign_of, moment_sign_of, signs_of
 from tirelib.campaign.check_rig import shown
 from tirelib.campaign.finding import RunFinding
 from tirelib.campaign.importing.rules import ImportMap
 from tirelib.campaign.model import FloatArray, Run, RunPlan
-from tirelib.campaign.problem import Problem
 
 _PLAN = RunPlan(0, "", "sweep", *(float("nan"),) * 6)
 
@@ -76,5 +76,5 @@ def _contradiction(
     column = rules.channels[quantity].column
     place = f"column {column!r} ({quantity})"
     remedy = f"correct axes in {rules.file}, or write sign = -1 for the column that is turned"
-    problem = Problem(f"{source}, {place}", given, allowed, remedy)
+    problem = CampaignFault(f"{source}, {place}", given, allowed, remedy)
     return RunFinding(f"sign {quantity}", source, place, problem)

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from tirelib.campaign.campaign_fault import CampaignFault
 from tirelib.campaign.importing.columns import Table
 from tirelib.campaign.importing.rules import ImportMap, SetPointRule
 from tirelib.campaign.importing.suggest import SET_POINTS, quantity_of
-from tirelib.campaign.problem import Problem
 
 
 class Unmapped:
@@ -44,14 +44,14 @@ class Unmapped:
                 max(high, float(values.max())),
             )
 
-    def warnings(self) -> Iterator[Problem]:
+    def warnings(self) -> Iterator[CampaignFault]:
         """Yield a warning for each column that varies, or that stands at a value nowhere stated."""
         for name, (quantity, unit, low, high) in self.known.items():
             if low == high and (low == 0.0 or quantity in self.planned):
                 continue
             varies = "varies" if low < high else "stands"
             ends = f"{low:g} .. {high:g} {unit}" if low < high else f"at {low:g} {unit}"
-            yield Problem(
+            yield CampaignFault(
                 f"column {name!r}",
                 f"it is known as {quantity}, {varies} ({ends.strip()}) and is not mapped",
                 f"what is not mapped is lost, and runs at different {quantity} count as repeats",

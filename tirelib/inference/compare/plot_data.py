@@ -42,7 +42,7 @@ from tirelib.model.solution import solved
 
 FORMAT = "tirelib-plot-data/1"
 CONDITIONS = ("pressure", "speed", "slip_angle", "camber", "slip_ratio")
-STEP = 1e-3
+NUMBER_STEP = 1e-3
 """Relative step of a brush's numbers."""
 Planted = Sequence[tuple[str, tuple[float, ...]]]
 
@@ -282,7 +282,9 @@ def _force_traces(
     columns = [np.ones_like(base)]
     for key, value in values.items():
         if np.isfinite(value) and value != 0.0:
-            columns.append((force({**values, key: value * (1.0 + STEP)}) - base) / STEP)
+            columns.append(
+                (force({**values, key: value * (1.0 + NUMBER_STEP)}) - base) / NUMBER_STEP
+            )
     basis = span(np.stack(columns, axis=1))
 
     def trace(effect: Effect, strength: tuple[float, ...]) -> FloatArray:

@@ -18,7 +18,8 @@ from tirelib.physics.ring.frequencies import natural_frequency, rim_stiffness
 SIDEWALL, MODAL, MASS, TREAD, GROWTH, SECTION = 0.03, 0.01, 0.03, 0.05, 0.05, 0.01
 """Relative accuracy (one standard deviation) of the tests; MASS is what a modal test takes."""
 ORDERS = np.arange(1, 9)
-STEP = 1e-5
+COORDINATE_STEP = 1e-5
+"""Move of a coordinate by which slopes are taken, unless an end of its range is nearer."""
 LEAST_STIFFNESS = 0.05
 """Share of the stiffness at the tire's pressure, below which no test is proposed at another one."""
 
@@ -157,7 +158,7 @@ def _slopes(
     for coordinate in free:
         value = float(np.max(values[coordinate.name]))
         low, high = coordinate.ends(value)
-        steps = max(-STEP, low), min(STEP, high)
+        steps = max(-COORDINATE_STEP, low), min(COORDINATE_STEP, high)
         moved = (float(coordinate.moved(value, z)) for z in steps)
         first, last = (np.asarray(measure(tire.changed(**{coordinate.name: v}))) for v in moved)
         columns.append((last - first) / (steps[1] - steps[0]))

@@ -21,7 +21,7 @@ from tirelib.inference.problems.force_plan import SPANS, blind, varies
 from tirelib.inference.problems.whiten_forces import PointWhitener
 from tirelib.inference.statistics.problem import Point
 from tirelib.model.brush import brush_forces
-from tirelib.model.brush_slopes import STEP, StateSlopes, moment_of
+from tirelib.model.brush_slopes import STATE_STEP, StateSlopes, moment_of
 
 COORDINATES: Mapping[str, tuple[str, ...]] = {
     "Fy": ("lateral_stiffness", "friction", "load_power", "slip_angle_offset", "Fy_offset"),
@@ -233,17 +233,17 @@ class ForceProblem:
         by, rows = StateSlopes(solved.state, solved.turn, self.quantity), []
         for k in range(point.base.size):
             base = point.base.copy()
-            base[k] += STEP
+            base[k] += STATE_STEP
             rows.append(by.toward(self._state(replace(point, base=base))))
         for k, effect in enumerate(point.effects):
             for j in range(effect.components):
                 strengths = [s.copy() for s in point.strengths]
                 # into the range, for a law may end there
                 inward = -1.0 if strengths[k][j] >= effect.high else 1.0
-                strengths[k][j] += inward * STEP * effect.scale
+                strengths[k][j] += inward * STATE_STEP * effect.scale
                 moved = self._state(replace(point, strengths=tuple(strengths)))
                 rows.append(inward * by.toward(moved))
-        return np.stack(rows) / STEP
+        return np.stack(rows) / STATE_STEP
 
     def remainder(self, point: Point, solved: ForceSolved) -> dict[str, FloatArray]:
         """Return smooth shapes over the slip, by how they go with the conditions of a point."""

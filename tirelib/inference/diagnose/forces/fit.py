@@ -19,7 +19,8 @@ MISFIT = 0.02
 """Part of the measured rms that counts as noise of the brush itself when residuals are scaled."""
 START_SHARE = 0.3
 """Start of a strength, as a share of either end of where it may lie."""
-STEP = 1e-5
+COORDINATE_STEP = 1e-5
+"""Move of a coordinate by which slopes are taken."""
 MOST_STEPS = 60
 """Steps of a fit, after which it is given up."""
 
@@ -168,7 +169,7 @@ def fit_force(
         rows = []
         for k in range(z.size):
             step = np.zeros_like(z)
-            step[k] = STEP if z[k] + STEP < high[k] else -STEP
+            step[k] = COORDINATE_STEP if z[k] + COORDINATE_STEP < high[k] else -COORDINATE_STEP
             rows.append((predicted(z + step) - here) / step[k])
         return np.stack(rows)
 

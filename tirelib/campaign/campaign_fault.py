@@ -10,7 +10,7 @@ Severity = Literal["error", "warning"]
 
 
 @dataclass(frozen=True, slots=True)
-class Problem(Fault):
+class CampaignFault(Fault):
     """A fault with its severity.
 
     Attributes
@@ -22,17 +22,17 @@ class Problem(Fault):
     severity: Severity = "error"
 
     @classmethod
-    def at(cls, where: str, fault: Fault) -> "Problem":
+    def at(cls, where: str, fault: Fault) -> "CampaignFault":
         """Return a fault that was found at a place which its finder did not know."""
         return cls(where, fault.given, fault.allowed, fault.remedy)
 
 
-def errors_of(problems: Iterable[Problem]) -> list[Problem]:
+def errors_of(problems: Iterable[CampaignFault]) -> list[CampaignFault]:
     """Return the problems that are errors, in their order."""
     return [problem for problem in problems if problem.severity == "error"]
 
 
-def raise_errors(problems: Iterable[Problem], prefix: str = "") -> None:
+def raise_errors(problems: Iterable[CampaignFault], prefix: str = "") -> None:
     """Raise one FormatError that holds every error among `problems`; warnings pass."""
     errors = [replace(problem, where=f"{prefix}{problem.where}") for problem in errors_of(problems)]
     if errors:
