@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from pyarrow import parquet
 
 from tests.bench.campaigns import tiny_runs
 from tests.bench.disks import little_room
@@ -25,6 +26,7 @@ from tirebench.recording.recording import Recorder, RecordingHeader
 from tirebench.wire.conditions import Conditions
 from tirebench.wire.device import Device
 from tirelib.campaign import check_campaign, read_campaign
+from tirelib.core.version import __version__
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.result import estimate_document
 from tirelib.measured.observations import observe
@@ -100,6 +102,8 @@ def test_a_table_has_every_sample_of_every_wheel(bus: Path, tmp_path: Path, endi
     out = tmp_path / f"a.{ending}"
     assert invoke("export", bus, "--out", out)[0] == 0
     table = pd.read_csv(out) if ending == "csv" else pd.read_parquet(out)
+    if ending == "parquet":
+        assert parquet.read_schema(out).metadata[b"tirelib"].decode() == __version__
     runs = tiny_runs()
     for wheel in (0, 1):
         for number, run in enumerate(runs):

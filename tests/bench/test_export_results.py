@@ -29,6 +29,7 @@ from tirebench.wire.can_batch import joined, pack, same_kind
 from tirebench.wire.conditions import Conditions
 from tirebench.wire.timeline import Samples
 from tirelib.campaign import check_campaign, read_campaign
+from tirelib.core.version import __version__
 
 TURNS = [replace(TURN, ready=0.02 * n, texts={"note": "restarted"} if n else {}) for n in range(3)]
 SPEEDS = [math.nan] * 10 + [36.0] * 51 + [72.0] * 39
@@ -123,6 +124,7 @@ def test_one_mdf4_file_has_all_of_it(recording: Path, tmp_path: Path) -> None:
         strain, speed = mdf.get("wheel_2_strain_3"), mdf.get("wheel_2_speed")
         load, note = mdf.get("wheel_2_Fz_N"), mdf.get("wheel_2_flags")
         event, text = mdf.get("event"), mdf.get("text")
+        assert mdf.header.description == f"written by tirelib {__version__}"
     assert (strain.unit, speed.unit, load.unit) == ("ustrain", "km/h", "N")
     np.testing.assert_allclose(strain.samples, physical(100)[:, 2])
     np.testing.assert_allclose(speed.samples, [math.nan, 36.0, 72.0])

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from tirelib.campaign.mdf_header import HEADER_END, START_TIME, WHOLE, check_beginning
 from tirelib.core.errors import Fault, FormatError
+from tirelib.core.version import WRITER
 
 _SHOWN = 12
 
@@ -296,4 +297,5 @@ def write_mdf(path: Path, groups: Sequence[Group]) -> None:
                 for channel in group.channels
             ]
             mdf.append(signals, common_timebase=True)
+        mdf.header.description = f"written by {WRITER}"
         mdf.save(path, overwrite=True)

@@ -22,6 +22,7 @@ import pyarrow.dataset as pads
 import pyarrow.parquet as pq
 
 from tirelib.core.errors import FormatError
+from tirelib.core.version import __version__
 from tirelib.fleet.sources import filesystem
 from tirelib.fleet.tables import PARTITION, SCHEMAS, SMALL
 
@@ -91,7 +92,8 @@ class DataSet:
                     f"{self.url}: not empty and not a data set of `tirelib fleet` (no {HEAD}); "
                     "choose another --out"
                 )
-            self.write(json.dumps({"format": FORMAT}).encode(), HEAD)
+            head = {"format": FORMAT, "tirelib": __version__}
+            self.write(json.dumps(head).encode(), HEAD)
         except FormatError:
             raise
         except Exception as error:  # each kind of storage has errors of its own

@@ -18,7 +18,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from tirelib.core.version import __version__
+from tirelib.core.version import WRITER
 
 AXES_NAME = "ISO 8855"
 """Axis system of every plot and page."""
@@ -57,7 +57,6 @@ STYLE: dict[Any, Any] = {
     "svg.fonttype": "path",
 }
 AGREEMENT = "estimated = measured"
-_WRITER = f"tirelib {__version__}"
 RESOLUTION = 110
 """Dots per inch of PNG files."""
 
@@ -156,11 +155,11 @@ def save(figure: Figure, folder: Path, name: str) -> str:
     canvas, engine, dots = figure.canvas, figure.get_layout_engine(), figure.dpi
     with mpl.rc_context(STYLE):
         figure.dpi = RESOLUTION
-        FigureCanvasAgg(figure).print_png(folder / f"{name}.png", metadata={"Software": _WRITER})
+        FigureCanvasAgg(figure).print_png(folder / f"{name}.png", metadata={"Software": WRITER})
         figure.dpi = dots  # of what an SVG file holds as pixels
         figure.set_layout_engine("none")  # the places are found; do not look for them twice
         FigureCanvasSVG(figure).print_svg(
-            folder / f"{name}.svg", metadata={"Date": None, "Creator": _WRITER}
+            folder / f"{name}.svg", metadata={"Date": None, "Creator": WRITER}
         )
         figure.set_layout_engine(engine)
     figure.dpi = dots

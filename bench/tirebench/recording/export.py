@@ -25,6 +25,7 @@ from tirelib.campaign import CampaignHeader, Run, RunPlan, write_campaign
 from tirelib.core.arrays import FloatArray
 from tirelib.core.held import HELD
 from tirelib.core.units import from_si
+from tirelib.core.version import __version__
 
 SHORTEST_RUN = 0.05
 """A segment shorter than this becomes no run of a campaign, [s]."""
@@ -130,7 +131,8 @@ def write_table(found: Iterator[Segment], conditions: Conditions, path: Path) ->
     rows, writer = 0, None
     try:
         for segment in found:
-            table = pa.table(sample_table(segment, conditions))
+            columns = sample_table(segment, conditions)
+            table = pa.table(columns, metadata={"tirelib": __version__})
             if writer is None:
                 kind = parquet.ParquetWriter if path.suffix == ".parquet" else csv.CSVWriter
                 writer = kind(str(path), table.schema)

@@ -20,6 +20,7 @@ from tirebench.recording.segments import Segment
 from tirebench.recording.topics import ESTIMATE, EVENTS
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.units import from_si
+from tirelib.core.version import WRITER, __version__
 
 Rows = dict[str, list[Any]]
 _ESTIMATED = (
@@ -101,6 +102,7 @@ def write_results(path: Path, out: Path, ending: str, wheel: int | None = None) 
         if not rows["utc_s"]:
             continue
         table = pd.DataFrame(rows)
+        table.attrs["tirelib"] = __version__  # a Parquet file keeps it
         with whole(file) as new:
             if ending == ".parquet":
                 table.to_parquet(new, index=False)
@@ -124,6 +126,7 @@ def write_mdf(path: Path, found: Sequence[Segment], known: Any, out: Path) -> in
         begun = datetime.fromtimestamp(1e-9 * recording.header.wall_ns, UTC)
     with MDF(version="4.10") as mdf:
         mdf.start_time = begun
+        mdf.header.description = f"written by {WRITER}"
         for prefix, title, mine in _clocks(found):
             _append_samples(mdf, prefix, title, mine)
             _append_conditions(mdf, prefix, f"{title}: conditions", mine, known)
