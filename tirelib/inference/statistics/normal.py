@@ -103,14 +103,15 @@ class Weighed:
     def __init__(self, normal: Normal, spread: FloatArray) -> None:
         self.normal = normal
         self.root = np.sqrt(np.maximum(spread, LEAST))
-        inner = np.eye(self.root.size) + self.root[:, None] * normal.gram * self.root
+        inner = self.root[:, None] * normal.gram * self.root
+        inner.flat[:: self.root.size + 1] += 1.0
         self.lower: FloatArray = linalg.cholesky(inner, lower=True, check_finite=False)
 
     @cached_property
     def _inverse(self) -> FloatArray:
         below, failed = linalg.lapack.dpotri(self.lower, lower=1)
         assert not failed  # noqa: S101 - the factor has a positive diagonal
-        out: FloatArray = np.tril(below) + np.tril(below, -1).T
+        out: FloatArray = below + np.tril(below, -1).T  # above the diagonal the factor is zero
         return out
 
     @cached_property
@@ -168,8 +169,11 @@ def taken(gram: FloatArray, right: FloatArray, block: slice, more: FloatArray) -
     more : shape (rows of the block,)
         Variance beyond D, larger than zero: the prior of the block's coefficients.
     """
+    here = right[block]
+    if more.size == 1:  # most effects have one strength, and a division costs least
+        return np.asarray(0.5 * here[0] ** 2 / (gram[block.start, block.start] + 1.0 / more[0]))
     inner = gram[block, block] + np.diag(1.0 / more)
-    return np.asarray(0.5 * np.sum(right[block] * np.linalg.solve(inner, right[block]), axis=0))
+    return np.asarray(0.5 * np.sum(here * np.linalg.solve(inner, here), axis=0))
 
 
 def beside(
