@@ -8,7 +8,7 @@ import numpy as np
 
 from tirelib.campaign import Campaign, RunPlan, conditions_of
 from tirelib.core.errors import CalibrationError
-from tirelib.core.traces import Conditions, StrainTrace
+from tirelib.core.traces import StrainTrace, TraceConditions
 from tirelib.measured.features import Features, concatenate_features, extract_features
 from tirelib.measured.signal import LowPass, Turns, cut_turns
 
@@ -83,7 +83,7 @@ def _one(trace: StrainTrace, row: slice) -> StrainTrace:
         rate=trace.rate[row],
         pulse=trace.pulse[row],
         axis_shift=trace.axis_shift[row],
-        conditions=Conditions(
+        conditions=TraceConditions(
             held.omega[row], held.speed[row], held.pressure[row], held.camber[row]
         ),
     )
@@ -102,5 +102,5 @@ def _join(traces: Sequence[StrainTrace]) -> StrainTrace:
         rate=joined("rate"),
         pulse=joined("pulse"),
         axis_shift=joined("axis_shift"),
-        conditions=Conditions(held("omega"), held("speed"), held("pressure"), held("camber")),
+        conditions=TraceConditions(held("omega"), held("speed"), held("pressure"), held("camber")),
     )

@@ -9,7 +9,7 @@ from tirelib.core.errors import ShapeError
 
 
 @dataclass(frozen=True, slots=True)
-class Conditions:
+class TraceConditions:
     """Operating conditions, one value per trace; NaN where unknown.
 
     Axes: ISO 8855. All arrays have shape (n_traces,).
@@ -61,7 +61,7 @@ class StrainTrace:
         Lateral gage position, ISO (left positive).
     axis_shift : shape (n_traces,), [rad]
         Wheel angle of the pulse's middle, from a trigger; NaN where unknown.
-    conditions : Conditions
+    conditions : TraceConditions
     """
 
     phi: FloatArray
@@ -70,7 +70,7 @@ class StrainTrace:
     pulse: FloatArray
     lateral: FloatArray
     axis_shift: FloatArray
-    conditions: Conditions
+    conditions: TraceConditions
 
     def __post_init__(self) -> None:
         wanted = (self.pulse.shape[0], self.lateral.shape[0], self.phi.shape[0])

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from tirelib.core.errors import ShapeError
-from tirelib.core.traces import Conditions, StrainTrace
+from tirelib.core.traces import StrainTrace, TraceConditions
 
 NAMES = ("omega", "speed", "pressure", "camber")
 
 
-def conditions(n: int = 3, **other: int) -> Conditions:
-    return Conditions(**{name: np.zeros(other.get(name, n)) for name in NAMES})
+def conditions(n: int = 3, **other: int) -> TraceConditions:
+    return TraceConditions(**{name: np.zeros(other.get(name, n)) for name in NAMES})
 
 
 @pytest.mark.parametrize("name", NAMES)

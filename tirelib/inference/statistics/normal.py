@@ -123,7 +123,9 @@ class Weighed:
     @cached_property
     def gram(self) -> FloatArray:
         """B C^-1 B', shape (m, m)."""
-        out: FloatArray = (np.eye(self.root.size) - self._inverse) / np.outer(self.root, self.root)
+        out: FloatArray = -self._inverse
+        out.flat[:: self.root.size + 1] += 1.0
+        out /= self.root[:, None] * self.root
         return out
 
     def right(self, right: FloatArray) -> FloatArray:

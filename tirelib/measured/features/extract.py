@@ -23,7 +23,7 @@ import numpy as np
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.compiled import GAGES, loaded_core
 from tirelib.core.flags import TurnFlag
-from tirelib.core.traces import Conditions
+from tirelib.core.traces import TraceConditions
 from tirelib.measured.features.compiled import read_by_core
 from tirelib.measured.features.peaks import peak
 from tirelib.measured.signal.turn import PHI, Turns, TurnValues
@@ -62,7 +62,7 @@ class Features(TurnValues):
         First moment of the strain about the middle of the contact over e_vertical, [rad]: zero for
         a symmetric contact.
     omega, speed, pressure, camber
-        Conditions of the turn, SI; all but the pressure are those at its contact.
+        TraceConditions of the turn, SI; all but the pressure are those at its contact.
     axis_shift
         Wheel angle of the pulse's middle, from a trigger, [rad].
     lateral : shape (n_gages,), [m]
@@ -164,7 +164,7 @@ def features_of(
     """Return features: those that were read from the curves, and what the turns bring."""
     trace, conditions = turns.trace, turns.trace.conditions
     brought = {field.name: getattr(turns, field.name) for field in fields(TurnValues)}
-    brought |= {field.name: getattr(conditions, field.name) for field in fields(Conditions)}
+    brought |= {field.name: getattr(conditions, field.name) for field in fields(TraceConditions)}
     brought |= {"flags": flags, "gage_flags": gage_flags}
     brought |= read
     return Features(**brought, axis_shift=trace.axis_shift, lateral=trace.lateral)

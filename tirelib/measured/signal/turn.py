@@ -8,7 +8,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.flags import TurnFlag
-from tirelib.core.traces import Conditions, StrainTrace
+from tirelib.core.traces import StrainTrace, TraceConditions
 
 PHI = np.linspace(-1.0, 0.8, 361)
 """Wheel-angle grid of a turn, [rad]; zero is the middle of the centre gage's pulse."""
@@ -128,7 +128,7 @@ def turns_of(columns: Mapping[str, Any], lateral: FloatArray, rate: float) -> Tu
     trace = StrainTrace(
         phi=PHI,
         lateral=lateral,
-        conditions=Conditions(**{name: columns[name] for name in conditions}),
+        conditions=TraceConditions(**{name: columns[name] for name in conditions}),
         **{name: columns[name] for name in ("strain", "rate", "pulse", "axis_shift")},
     )
     values = {field.name: columns[field.name] for field in fields(TurnValues)}

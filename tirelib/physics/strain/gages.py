@@ -21,7 +21,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError, ShapeError
-from tirelib.core.traces import Conditions, StrainTrace
+from tirelib.core.traces import StrainTrace, TraceConditions
 from tirelib.measured.signal.contacts import RISE
 from tirelib.measured.signal.lowpass import LowPass
 from tirelib.measured.signal.turns import OFFSET_HALF_WIDTH, PHI
@@ -136,7 +136,7 @@ def gage_trace(
         pulse=pulse,
         lateral=contact.layout.lateral,
         axis_shift=shift - _wind(contact, centre, shift),
-        conditions=Conditions(
+        conditions=TraceConditions(
             omega=contact.omega,
             speed=unknown if speed is None else np.asarray(speed, dtype=float),
             pressure=contact.pressure,
