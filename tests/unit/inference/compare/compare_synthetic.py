@@ -72,7 +72,14 @@ def off_by(
             for each, more, higher in zip(conditions, load, pressure, strict=True)
         ]
     )
-    return solved(values_of(model_file().tire), true, low_pass=low_pass), true
+    start = of_the_plan().rolling if conditions == tuple(plan()) else None
+    return solved(values_of(model_file().tire), true, low_pass=low_pass, start=start), true
+
+
+@cache
+def of_the_plan() -> Solution:
+    """Return what the model shows at the plan's set points."""
+    return solved(values_of(model_file().tire), points_of(plan()), low_pass=LowPass())
 
 
 def waveforms(
