@@ -21,7 +21,6 @@ from tirelib.core.arrays import FloatArray
 from tirelib.effects import CATALOGUE
 from tirelib.inference.compare.force_model import ForceModel
 from tirelib.inference.diagnose.forces.case import ForceCase
-from tirelib.inference.diagnose.forces.fit import MeasuredForce
 from tirelib.inference.diagnose.forces.models import plain_tires
 from tirelib.inference.identify.brush_fit import fit_brush
 from tirelib.inference.identify.brush_law import BrushModel
@@ -188,8 +187,8 @@ def case_of(data: ForceData) -> ForceCase:
     model = ForceModel(
         "fitted", BrushModel("fitted", values, fit.reference, None), (), reference, ()
     )
-    problem = MeasuredForce.of(model.bench(force_points(data)), "Fy", NOISE)
-    return ForceCase("steady", model, problem, problem, NOISE, len(problem) // 2, ())
+    bench = model.bench(force_points(data))
+    return ForceCase("steady", model, "Fy", bench, bench, NOISE, len(bench.points) // 2, ())
 
 
 def hypotheses_of(case: ForceCase) -> Hypotheses:
@@ -227,7 +226,7 @@ def pairs(*, scattered: bool = False) -> list[Pair]:
         at = PLANS[plan].points(REFERENCE)
         case = case_of(Tire(REFERENCE, float(at["time"].max()), DRIFTS[0], 0.0).measured(at, 0))
         wanted = [CATALOGUE[name] for name in PLANTED]
-        problem = ForceProblem(case.problem.bench, "Fy", case.model.values, wanted, noise=NOISE)
+        problem = ForceProblem(case.bench, "Fy", case.model.values, wanted, noise=NOISE)
         living, count = problem.living, len(problem.names)
         zeros = tuple(np.zeros(effect.components) for effect in living)
         point = Point(problem.start.base, living, zeros)
@@ -276,8 +275,8 @@ def _with_run(
     case: ForceCase, envelope: Envelope, point: FloatArray, tire: Tire, before: int
 ) -> ForceCase:
     """Return a campaign with one run more, after so many further ones."""
-    bench = bench_ahead(case.problem.bench, case.model, envelope, point[None])
-    n, size = len(case.problem), envelope.points
+    bench = bench_ahead(case.bench, case.model, envelope, point[None])
+    n, size = len(case.bench.points), envelope.points
     at = bench.conditions.take(np.arange(n, n + size))
     told = {name: getattr(at, name) for name in ("load", "pressure", "slip_angle", "temperature")}
     later = tire.span + (1 + before) * PAUSE + before * PACE * size
@@ -286,8 +285,7 @@ def _with_run(
     off = tire.measured(told, 2 + 2 * before)
     told |= {name: getattr(off, name) for name in ("load", "pressure", "slip_angle")}
     side = tire.measured(told, 3 + 2 * before).Fy
-    measured = np.concatenate([case.problem.measured, side])
+    measured = np.concatenate([case.bench.points.data.Fy, side])
     data = replace(bench.points.data, Fy=measured)
     bench = replace(bench, points=replace(bench.points, data=data))
-    longer = MeasuredForce.of(bench, "Fy", NOISE)
-    return replace(case, problem=longer, whole=longer)
+    return replace(case, bench=bench, whole=bench)

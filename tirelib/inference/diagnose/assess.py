@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.core.errors import TirelibError
 from tirelib.effects import Effect
 from tirelib.inference.compare.error import NOISE, ModelError
 from tirelib.inference.compare.model import TireModel
@@ -67,16 +66,12 @@ class Assessed:
         """The model with the named effects."""
         return self.diagnosis.final if self.named else self.diagnosis.base
 
-    @property
-    def factor(self) -> float:
-        """Factor from errors on what was held out to errors in the unit of the document."""
-        return 1.0
-
     def held_out(self, fit: Any) -> tuple[float, ...]:
         """Return the errors of a model on each fold; none without folds, or a model."""
         if not self.folds or fit is None:
             return ()
-        return tuple(self.factor * error for error in self.diagnosis.models.held_out(fit))
+        held: tuple[float, ...] = self.diagnosis.models.held_out(fit)
+        return held
 
     def error_with(self, finding: Finding) -> float:
         """Return the error with one effect alone, to first order unless it is named."""
@@ -122,9 +117,9 @@ def assess(found: Diagnosis, given: TireModel) -> Assessment:
         messages.append(NO_REPEATS)
     final = found.final if named else found.base
     chosen = models.folds if named else ()
-    singles = {name: one for name in named if (one := _with_one(found, name)) is not None}
-    models.find(found.base, given, held=(found.base, *singles.values(), final) if chosen else ())
-    before, refitted = models.least_error(found.base, given)
+    singles = models.singles(named)
+    held = (found.base, *singles.values(), final) if chosen else ()
+    before, refitted = models.least_error(found.base, given, held)
     after = final.reached if named else refitted
     if named and not chosen:
         messages.append(NO_RUNS)
@@ -156,14 +151,6 @@ def _too_large(finding: Finding) -> str:
     )
 
 
-def _with_one(found: Diagnosis, name: str) -> Fitted | None:
-    """Return the base model with one effect fitted, or None if that fails."""
-    try:
-        return found.models.at((name,))
-    except TirelibError:
-        return None
-
-
 def _left(found: Diagnosis, final: Fitted) -> Left:
     """Return what is left; how it grows by the guessed law, where there is one."""
     left = left_of(final.reached, found.problem.data.points, found.beyond)
@@ -187,14 +174,11 @@ class ForceAssessment(Assessed):
     case: ForceCase
     left: ForceLeft
 
-    @property
-    def factor(self) -> float:
-        """Factor from an rms in SI to an error in the unit of the document."""
-        return self.case.factor
-
     def error_with(self, finding: Finding) -> float:
         """Return the error with one effect alone, to first order unless it is named."""
-        return self.factor * self.diagnosis.error_with(finding)
+        if finding.effect.name in self.singles:
+            return float(self.singles[finding.effect.name].error)
+        return self.diagnosis.base.error * float(np.sqrt(max(1.0 - finding.share, 0.0)))
 
     @property
     def before(self) -> float:
@@ -204,7 +188,7 @@ class ForceAssessment(Assessed):
     @property
     def after(self) -> float:
         """The error with the named effects."""
-        return self.case.error(self.final)
+        return float(self.final.error)
 
 
 def assess_forces(
@@ -218,7 +202,7 @@ def assess_forces(
     found = diagnose_force(case, catalogue, false_alarm=false_alarm, progress=progress)
     messages = list(case.messages)
     verdict, named, findings = found.verdict.kind, found.named, found.findings
-    share = found.final.error / float(np.sqrt(np.mean(case.problem.measured**2)))
+    share = found.final.error / case.size
     if share > NO_FIT:
         verdict, named = "unknown", ()
         messages.append(
@@ -245,12 +229,12 @@ def assess_forces(
         verdict=verdict,
         named=named,
         findings=findings,
-        floor=case.told(found.models.floor(final), final),
+        floor=found.models.floor(final),
         folds=found.models.folds,
         singles=found.alone,
         messages=tuple(messages),
         case=case,
-        left=force_left(case.problem, final),
+        left=force_left(final),
     )
 
 
@@ -274,7 +258,7 @@ def _in_order(case: ForceCase, effects: Sequence[Effect]) -> list[str]:
 
     A condition counts if a named effect goes with it, or a named drift may stand for it.
     """
-    at = case.problem.bench.conditions
+    at = case.bench.conditions
     names = {name for effect in effects for name in effect.varies_with}
     every = {"load", "pressure", "camber", "temperature", "speed"}
     out = []

@@ -83,10 +83,10 @@ def _force(told: ForceAssessment) -> dict[str, Any]:
         "unit": UNITS[case.quantity],
         "noise": case.noise,
         "repeats": case.repeats,
-        "points": len(case.problem),
+        "points": len(case.bench.points),
         "error_unit": case.unit,
         "error_before": told.before,
-        "error_refitted": case.error(found.base),
+        "error_refitted": found.base.error,
         "error_after": told.after,
         "residual_rms_before": told.before / case.factor,
         "residual_rms_after": told.after / case.factor,
@@ -94,7 +94,7 @@ def _force(told: ForceAssessment) -> dict[str, Any]:
         "steps": [
             {
                 "effect": name,
-                "error": case.factor * fit.error,
+                "error": fit.error,
                 "heldout_error": pooled(told.held_out(fit), told.folds),
             }
             for name, fit in (found.steps if told.named else ())

@@ -15,9 +15,9 @@ import numpy as np
 
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.quantities import QUANTITIES
-from tirelib.inference.diagnose.forces.fit import MeasuredForce
 from tirelib.inference.identify.campaign_data import LEAST_RUNS, Data
 from tirelib.inference.identify.error_bands import levels
+from tirelib.inference.identify.force_bench import ForceBench
 from tirelib.inference.identify.force_points import set_points
 from tirelib.inference.problems.force_plan import varies
 
@@ -97,21 +97,21 @@ def strain_folds(data: Data) -> tuple[Fold, ...]:
     return tuple(found)
 
 
-def force_folds(problem: MeasuredForce) -> tuple[Fold, ...]:
+def force_folds(bench: ForceBench) -> tuple[Fold, ...]:
     """Return what the points of a force allow to leave out."""
-    points, at = problem.bench.points, problem.bench.conditions
+    points, at = bench.points, bench.conditions
     found: list[Fold] = []
     swept = bool(points.sweep.all())
     if swept:
-        found += _parts("time", _blocks(points.data.time, problem.block))
+        found += _parts("time", _blocks(points.data.time, points.data.block))
     for name in (each for each in _CONDITIONS if varies(at, each)):
         values = np.abs(getattr(at, name))
         out = _highest(name, values)
         found.append(Fold(name, float(values[out].mean()), out, not swept, "points"))
-    good = tuple(fold for fold in found if _usable(problem, fold))
+    good = tuple(fold for fold in found if _usable(bench, fold))
     if any(fold.main for fold in good):
         return good
-    return (*good, *(fold for fold in _parts("cell", points.cell) if _usable(problem, fold)))
+    return (*good, *(fold for fold in _parts("cell", points.cell) if _usable(bench, fold)))
 
 
 def _parts(name: str, number: IntArray) -> list[Fold]:
@@ -127,13 +127,13 @@ def _blocks(time: FloatArray, block: IntArray) -> IntArray:
     return block
 
 
-def _usable(problem: MeasuredForce, fold: Fold) -> bool:
+def _usable(bench: ForceBench, fold: Fold) -> bool:
     """Whether enough is left out, enough is left to fit, and the condition still varies there."""
-    out, n = int(fold.out.sum()), len(problem)
+    out, n = int(fold.out.sum()), len(bench.points)
     if out < 3 or n - out < LEAST_POINTS:
         return False
     # else a law over the condition would be free
-    at = problem.bench.conditions
+    at = bench.conditions
     return fold.name in ("time", "cell") or varies(at.take(~fold.out), fold.name)
 
 

@@ -12,8 +12,9 @@ from tirelib.effects.state import Operating
 from tirelib.inference.compare.error import ModelError
 from tirelib.inference.compare.sectors import SECTORS, sectors_of
 from tirelib.inference.compare.sentences import PLACES
-from tirelib.inference.diagnose.forces.fit import ForceFit, MeasuredForce
+from tirelib.inference.diagnose.forces.models import ForceFit
 from tirelib.inference.identify.error_bands import levels
+from tirelib.inference.identify.force_bench import ForceBench
 from tirelib.inference.problems.force_plan import varies
 from tirelib.inference.problems.forces import slip_of
 from tirelib.measured.waveforms import GRID
@@ -198,18 +199,19 @@ class ForceLeft:
     guess: str | None
 
 
-def force_left(problem: MeasuredForce, model: ForceFit) -> ForceLeft:
+def force_left(model: ForceFit) -> ForceLeft:
     """Return what a fitted model leaves of the force that it was fitted to."""
-    residual = model.predicted - problem.measured
+    bench, residual = model.problem.bench, -model.rest
     # without the effects
-    x = np.abs(slip_of(problem.bench.state(model.values), problem.quantity))
+    slip = slip_of(bench.state(model.values), model.problem.quantity)
+    x = np.abs(slip)
     squares = residual**2
     total = max(float(squares.sum()), 1e-30)
     shares = {
         name: float(squares[(x >= low) & (x < high)].sum()) / total for low, high, name in BANDS
     }
     first = max(shares, key=lambda name: shares[name])
-    powers = _force_powers(problem.bench.conditions, np.abs(residual))
+    powers = _force_powers(bench.conditions, np.abs(residual))
     moves = [
         f"{'grows' if power.value > 0 else 'falls'} with {name} "
         f"(power {power.value:+.1f} ± {power.half:.1f})"
@@ -222,7 +224,7 @@ def force_left(problem: MeasuredForce, model: ForceFit) -> ForceLeft:
         " and ".join(moves) or "has the same size at all loads, pressures and speeds",
         shares,
         powers,
-        _guess(problem, model, residual),
+        _guess(bench, slip, residual),
     )
 
 
@@ -231,11 +233,11 @@ def _force_powers(at: BrushConditions, size: FloatArray) -> dict[str, Power]:
     return powers_of({name: getattr(at, name) for name in names}, size)
 
 
-def _guess(problem: MeasuredForce, model: ForceFit, residual: FloatArray) -> str | None:
+def _guess(bench: ForceBench, x: FloatArray, residual: FloatArray) -> str | None:
     """Return the product of a slip term and a condition that explains most on other points."""
-    if len(problem) < 40:
+    if x.size < 40:
         return None
-    at, x = problem.bench.conditions, slip_of(problem.bench.state(model.values), problem.quantity)
+    at = bench.conditions
     soft = x / (1.0 + np.abs(x))
     slips = {
         "slip / (1 + |slip|)": soft,
@@ -251,9 +253,9 @@ def _guess(problem: MeasuredForce, model: ForceFit, residual: FloatArray) -> str
         if varies(at, name):
             factors[name] = getattr(at, name) - float(np.mean(getattr(at, name)))
     load = at.load
-    seen: BoolArray = np.asarray(problem.block % 2 == 0)
+    seen: BoolArray = np.asarray(bench.points.data.block % 2 == 0)
     if seen.all() or not seen.any():
-        seen = np.arange(len(problem)) % 2 == 0
+        seen = np.arange(x.size) % 2 == 0
     best, name = GUESS_GAIN, ""
     for slip_name, slip in slips.items():
         for factor_name, factor in factors.items():

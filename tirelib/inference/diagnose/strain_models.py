@@ -9,17 +9,16 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import ConvergenceError, TirelibError
-from tirelib.core.forked import forked
 from tirelib.effects import Effect
 from tirelib.inference.compare.error import ModelError, Yardstick
 from tirelib.inference.compare.model import TireModel
 from tirelib.inference.diagnose.held_out import Fold, strain_folds
+from tirelib.inference.diagnose.models import Models
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.identify.delay import UNIT
 from tirelib.inference.problems.strain import StrainProblem
@@ -223,26 +222,21 @@ def floor_of(error: ModelError, hypothesis: Hypothesis, alpha: float) -> float:
     return min(error.value, float(np.sqrt(np.mean(left**2))))
 
 
-class StrainModels:
-    """A model on straight runs and with further effects (`tirelib.inference.extend.step.Models`).
+class StrainModels(Models[Fitted, ModelError | None]):
+    """A model on straight runs and with further effects.
 
     Attributes
     ----------
     problem : StrainProblem
         Its whitening is about the fitted model.
-    folds : tuple of Fold
-        What can be left out in turn.
     """
 
     def __init__(
         self, hypotheses: Hypotheses, progress: Callable[[str], None] | None = None
     ) -> None:
-        self.hypotheses, self.progress = hypotheses, progress
         self.problem = problem_of(hypotheses)
         self.yardstick = Yardstick.of(self.problem.runs)
-        self.folds = strain_folds(self.problem.data)
-        self._fitted: dict[frozenset[str], Fitted] = {}
-        self._held: dict[Fitted, tuple[ModelError | None, ...]] = {}
+        super().__init__(hypotheses, strain_folds(self.problem.data), progress)
         self._least: dict[Fitted, tuple[ModelError, ModelError]] = {}
 
     @property
@@ -250,75 +244,36 @@ class StrainModels:
         """The straight runs."""
         return self.problem.runs
 
-    def dead(self, effect: Effect) -> str:
-        """Return why the runs cannot show an effect, or an empty text."""
-        return self.problem.dead.get(effect.name, "")
+    def _fit(self, names: Sequence[str], near: Fitted | None) -> Fitted:
+        found = self.hypotheses.at(names, None if near is None else near.hypothesis)
+        if found is None:
+            raise ConvergenceError(
+                f"effect {names[-1]!r}: its fit did not settle; the model with it does not "
+                "fit these runs: look at them with `tirelib compare`, or add another effect "
+                "first",
+                self.problem.values,
+                np.inf,
+            )
+        return Fitted.of(self.hypotheses, found, self.yardstick)
 
-    def at(self, names: Sequence[str] = (), near: Fitted | None = None) -> Fitted:
-        """Return the model with further effects, all fitted at once.
-
-        `near` is a model from whose fit this one starts.
-
-        Raises
-        ------
-        ConvergenceError
-            If no fit settles.
-        CalibrationError
-            If the model alone, without what plain tires show, has no solution.
-        """
-        key = frozenset(names)
-        if key not in self._fitted:
-            found = self.hypotheses.at(names, None if near is None else near.hypothesis)
-            if found is None:
-                raise ConvergenceError(
-                    f"effect {names[-1]!r}: its fit did not settle; the model with it does not "
-                    "fit these runs: look at them with `tirelib compare`, or add another effect "
-                    "first",
-                    self.problem.values,
-                    np.inf,
-                )
-            self._fitted[key] = Fitted.of(self.hypotheses, found, self.yardstick)
-        return self._fitted[key]
-
-    def with_effect(self, before: Fitted, effect: Effect) -> Fitted:
-        """Return the fit with one effect more; errors as of `at`."""
-        return self.at((*self.hypotheses.added(before.hypothesis), effect.name), before)
+    def _left_out(self, fit: Fitted, fold: Fold) -> ModelError | None:
+        return fit.held_out(fold, self.yardstick)
 
     def least_error(
-        self, fit: Fitted, given: TireModel | None = None
+        self, fit: Fitted, given: TireModel | None = None, held: Sequence[Fitted] = ()
     ) -> tuple[ModelError, ModelError]:
-        """Return `Fitted.least_error`; the given model is as it was fitted by default."""
-        self.find(fit, given)
-        return self._least[fit]
+        """Return `Fitted.least_error`; the given model is as it was fitted by default.
 
-    def left_out(self, fit: Fitted) -> tuple[ModelError | None, ...]:
-        """Return the errors of a model on each fold's runs, as `Fitted.held_out`."""
-        self.find(held=[fit])
-        return self._held[fit]
-
-    def find(
-        self, fit: Fitted | None = None, given: TireModel | None = None, held: Sequence[Fitted] = ()
-    ) -> None:
-        """Find the least error of a model, and errors of models on each fold's runs, all at once.
-
-        The arguments are those of `least_error` and `left_out`, which only look up what is found.
+        What `held` models leave on each fold is found at the same time.
         """
-        calls: list[Callable[[], Any]] = []
-        if fit is not None and fit not in self._least:
-            calls.append(partial(fit.least_error, given or fit.model, self.yardstick))
-        ahead = len(calls)
-        new = [each for each in dict.fromkeys(held) if each not in self._held]
-        calls += [
-            partial(each.held_out, fold, self.yardstick) for each in new for fold in self.folds
-        ]
-        if len(calls) > ahead and self.progress is not None:
-            self.progress(f"holding out some of the runs: {len(calls) - ahead} fits to the others")
-        found = forked(calls)
-        if fit is not None and ahead:
-            self._least[fit] = found[0]
-        for k, each in enumerate(new):
-            first = ahead + k * len(self.folds)
-            self._held[each] = tuple(found[first : first + len(self.folds)])
+        new = (
+            []
+            if fit in self._least
+            else [partial(fit.least_error, given or fit.model, self.yardstick)]
+        )
+        for found in self.find(held, new):
+            self._least[fit] = found
+        return self._least[fit]
 
     def held_out(self, fit: Fitted) -> tuple[float, ...]:
         """Return the errors of a model on each fold's runs; NaN where there is none."""

@@ -22,9 +22,9 @@ NO_REPEATS = (
 def extension_document(done: Extension | ForceExtension, file: TireFile) -> dict[str, Any]:
     """Return the numbers of an extension and the history of the model that came out."""
     if isinstance(done, Extension):
-        head, messages, factor = _strain(done), _strain_messages(done), 1.0
+        head, messages = _strain(done), _strain_messages(done)
     else:
-        head, messages, factor = _force(done), _force_messages(done), done.case.factor
+        head, messages = _force(done), _force_messages(done)
     held_out = zip(done.folds, done.held_before, done.held_after, strict=True)
     return {
         "format": FORMAT,
@@ -39,7 +39,7 @@ def extension_document(done: Extension | ForceExtension, file: TireFile) -> dict
         "flags": list(done.flags),
         **head,
         "waterfall": waterfall(file.extra["history"], str(head["quantity"])),
-        "held_out": [fold.entry(factor * old, factor * new) for fold, old, new in held_out],
+        "held_out": [fold.entry(old, new) for fold, old, new in held_out],
         "effects": list(file.extra["effects"]),
         "history": [
             {key: value for key, value in entry.items() if key != "before"}

@@ -13,9 +13,8 @@ from tirelib.inference.compare.error import ModelError
 from tirelib.inference.compare.model import TireModel
 from tirelib.inference.diagnose.diagnose import FALSE_ALARM, plain_tires
 from tirelib.inference.diagnose.forces.case import ForceCase
-from tirelib.inference.diagnose.forces.fit import ForceFit
-from tirelib.inference.diagnose.forces.models import ForceModels
-from tirelib.inference.diagnose.held_out import pooled
+from tirelib.inference.diagnose.forces.models import ForceFit, ForceModels
+from tirelib.inference.diagnose.forces.models import plain_tires as plain_of_force
 from tirelib.inference.diagnose.strain_models import Fitted, StrainModels
 from tirelib.inference.extend.step import (
     Step,
@@ -65,14 +64,13 @@ class Extension(Step[Fitted]):
             "error_before": self.given.value,
             "error_after": self.reached.value,
             "floor": self.floor,
-            "heldout_error_before": pooled(self.held_before, self.folds),
-            "heldout_error_after": pooled(self.held_after, self.folds),
+            **self.pooled,
         }
 
 
 @dataclass(frozen=True, eq=False)
 class ForceExtension(Step[ForceFit]):
-    """A step of a brush; errors in [N] or [N m].
+    """A step of a brush.
 
     Attributes
     ----------
@@ -91,17 +89,12 @@ class ForceExtension(Step[ForceFit]):
     @property
     def errors(self) -> dict[str, float]:
         """Errors as the model's history has them."""
-        case = self.case
-        pairs = (("before", self.held_before), ("after", self.held_after))
         return {
             "error_before": self.given,
-            "error_refitted": case.error(self.before),
-            "error_after": case.error(self.after),
-            "floor": case.told(self.floor, self.after),
-            **{
-                f"heldout_error_{when}": pooled([case.factor * e for e in errors], self.folds)
-                for when, errors in pairs
-            },
+            "error_refitted": self.before.error,
+            "error_after": self.after.error,
+            "floor": self.floor,
+            **self.pooled,
         }
 
 
@@ -177,7 +170,7 @@ def extended_brush(
     models: ForceModels, case: ForceCase, effect: Effect, before: ForceFit | None = None
 ) -> ForceExtension:
     """Return a brush with one effect more; arguments and errors as of `extended`."""
-    given = case.given if before is None else case.error(before)
+    given = case.given if before is None else before.error
     return ForceExtension(**vars(added(models, effect, before)), case=case, given=given)
 
 
@@ -197,8 +190,8 @@ def force_models(
     case: ForceCase, more: Sequence[Effect] = (), progress: Progress | None = None
 ) -> ForceModels:
     """Return models about the brush of a case; `more` effects may be the user's own."""
-    given = case.as_given(_catalogue(more))
-    return ForceModels(case.problem, given, FALSE_ALARM, progress=progress)
+    given, families = case.as_given(_catalogue(more)), plain_of_force(case.quantity)
+    return ForceModels(case, Hypotheses(given, families, FALSE_ALARM, progress), progress)
 
 
 def _catalogue(more: Sequence[Effect]) -> list[Effect]:

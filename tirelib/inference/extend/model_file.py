@@ -73,10 +73,10 @@ def _ring(file: TireFile, done: Extension) -> tuple[tuple[str, ...], dict[str, N
 def _brush(done: ForceExtension) -> dict[str, Number]:
     """Return the numbers that were fitted to a force."""
     case, after = done.case, done.after
-    source = f"{case.quantity} of {case.name}, {len(case.problem)} points"
+    source = f"{case.quantity} of {case.name}, {len(case.bench.points)} points"
     numbers = dict(
         stored_number(name, after.values[name], after.value_std(name), "fitted", source)
-        for name in after.names
+        for name in after.problem.names
     )
     _refuse_beyond({name: number.value for name, number in numbers.items()})
     return numbers

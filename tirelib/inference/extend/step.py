@@ -6,62 +6,18 @@ What differs is how a model is fitted to its campaign, what its floor is and wha
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic
 
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.effects import Effect
-from tirelib.inference.diagnose.held_out import Fold
+from tirelib.inference.diagnose.held_out import Fold, pooled
+from tirelib.inference.diagnose.models import F, Fit, Models
 
 SIGNIFICANT = 2.0
 """Standard deviations below which a strength is no different from zero."""
-
-
-class Fit(Protocol):
-    """A fitted model."""
-
-    @property
-    def effects(self) -> tuple[Effect, ...]:
-        """That the model has."""
-
-    @property
-    def strengths(self) -> tuple[FloatArray, ...]:
-        """One array of components per effect."""
-
-    @property
-    def error(self) -> float:
-        """Rms of what is left."""
-
-    def strength_std(self, index: int) -> FloatArray:
-        """Return standard deviations of an effect's strength."""
-
-
-F = TypeVar("F", bound=Fit)
-
-
-class Models(Protocol[F]):
-    """A model on a campaign, and others about it, each fitted once."""
-
-    @property
-    def folds(self) -> Sequence[Fold]:
-        """What can be left out of a fit in turn."""
-
-    def at(self) -> F:
-        """Return the model as it is, fitted."""
-
-    def dead(self, effect: Effect) -> str:
-        """Return why the campaign cannot show an effect, or an empty text."""
-
-    def with_effect(self, before: F, effect: Effect) -> F:
-        """Return the fit with one effect more."""
-
-    def held_out(self, fit: F) -> tuple[float, ...]:
-        """Return the errors on what is left out."""
-
-    def floor(self, fit: F) -> float:
-        """Return the error that structure leaves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,8 +52,16 @@ class Step(Generic[F]):
     held_after: tuple[float, ...]
     flags: tuple[str, ...]
 
+    @property
+    def pooled(self) -> dict[str, float]:
+        """The held-out errors as documents and histories have them."""
+        return {
+            "heldout_error_before": pooled(self.held_before, self.folds),
+            "heldout_error_after": pooled(self.held_after, self.folds),
+        }
 
-def added(models: Models[F], effect: Effect, before: F | None = None) -> Step[F]:
+
+def added(models: Models[F, Any], effect: Effect, before: F | None = None) -> Step[F]:
     """Return a model with one effect more, everything fitted anew.
 
     `before` is one of the models, with effects that were added before; the one without by default.
@@ -119,7 +83,7 @@ def added(models: Models[F], effect: Effect, before: F | None = None) -> Step[F]
     return _judged("add", effect, models, first, models, after)
 
 
-def removed(models: Models[F], effect: Effect, fewer: Models[F]) -> Step[F]:
+def removed(models: Models[F, Any], effect: Effect, fewer: Models[F, Any]) -> Step[F]:
     """Return a model without one of its effects, which others are about; the rest fitted anew.
 
     Raises
@@ -157,7 +121,7 @@ def without(fit: Fit, effect: Effect) -> tuple[tuple[Effect, ...], tuple[FloatAr
 
 
 def _judged(
-    action: str, effect: Effect, models: Models[F], before: F, others: Models[F], after: F
+    action: str, effect: Effect, models: Models[F, Any], before: F, others: Models[F, Any], after: F
 ) -> Step[F]:
     """Return the step between two models."""
     having = after if action == "add" else before

@@ -18,7 +18,7 @@ from tirelib.inference.problems.force_plan import varies
 
 def force_axes(case: ForceCase) -> tuple[str, ...]:
     """Return the conditions that a further point of a force may have."""
-    at = case.problem.bench.conditions
+    at = case.bench.conditions
     slip = ("slip_ratio",) if case.quantity == "Fx" else ("slip_angle",)
     known = [name for name in ("load", "pressure", "speed") if np.isfinite(getattr(at, name)).all()]
     other = [
@@ -39,9 +39,9 @@ def force_envelope(case: ForceCase, sweep: bool | None = None, **declared: Any) 
     ParameterError
         As `Envelope.of`; or the declared range of the slip holds none of the campaign's slips.
     """
-    envelope = Envelope.of(case.problem.bench.conditions, force_axes(case), **declared)
+    envelope = Envelope.of(case.bench.conditions, force_axes(case), **declared)
     name = "slip_ratio" if case.quantity == "Fx" else "slip_angle"
-    found = campaign_sweep(case.problem.bench.points, name, sweep)
+    found = campaign_sweep(case.bench.points, name, sweep)
     return envelope if found is None else envelope.swept(found)
 
 

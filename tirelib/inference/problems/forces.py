@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import TirelibError
 from tirelib.effects import Effect
 from tirelib.effects.brush_state import BrushState
@@ -182,6 +182,23 @@ class ForceProblem:
     def own_misfit(self, own: float) -> float:
         """Return the standard deviation of a block's own misfit, as a mean, [N] or [N m]."""
         return OWN * own * float(np.mean(self.size[: self.present]))
+
+    def part(self, chosen: BoolArray, start: Point) -> "ForceProblem":
+        """Return the problem of some of the points (n,), without effects that may be missing.
+
+        Parameters
+        ----------
+        chosen : shape (n,)
+        start : Point
+            The model.
+        """
+        out = copy(self)
+        out.bench, out.measured = self.bench.take(chosen), self.measured[chosen]
+        out.size, out.noise, out.slip = self.size[chosen], self.noise[chosen], self.slip[chosen]
+        out._tangent, out._base = self._tangent[chosen], self._base[chosen]
+        out.present, out._whiteners = int(chosen.sum()), {}
+        out.start, out.starts, out.living = start, (start,), ()
+        return out
 
     def repeated(self, times: float) -> "ForceProblem":
         """Return the problem of the same points, each the mean of so many measurements."""

@@ -1,7 +1,7 @@
 """A step of a fit that lowers the cost as its slopes promise, or a shorter one that does."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -41,21 +41,42 @@ class Lower:
 def downhill(
     problem: Model, here: Quadratic, point: Point, solved: Any, whiten: Whiten, damping: float
 ) -> Lower | None:
-    """Return a point whose cost is lower as promised, by ever shorter steps; None if none is."""
+    """Return a point whose cost is lower as promised, by ever shorter steps; None if none is.
+
+    A law may end where its range does. Where a step has no solution, one is tried that stays within
+    the ranges of strengths.
+    """
+    inside = _inside(here, point)
+    parabolas = (here, inside) if (inside.step() != here.step()).any() else (here,)
     while damping < HARDEST:
-        dz = here.step(damping)
-        share = min(1.0, LONGEST / float(np.abs(dz).max()))
-        tried = _tried(problem, point, share * dz, solved)
-        if tried is not None:
+        for dz in (each.step(damping) for each in parabolas):
+            share = LONGEST / max(LONGEST, float(np.abs(dz).max()))
+            tried = _tried(problem, point, share * dz, solved)
+            if tried is None:
+                continue
             rest = whiten(tried[1].rest)
             cost = here.cost_at(tried[0].coordinates, rest)
-            brought = (here.cost - cost) / (share * here.fall(dz))
-            if brought > LEAST_FALL:
+            promised = share * here.fall(dz)
+            if here.cost - cost > LEAST_FALL * promised:
                 moved = share * float(np.abs(dz / here.deviation).max())
-                after = max(damping, FIRST) if brought < GOOD else 0.1 * damping
+                good = here.cost - cost >= GOOD * promised
+                after = 0.1 * damping if good else max(damping, FIRST)
                 return Lower(*tried, rest, cost, moved, after)
+            break
         damping = max(10.0 * damping, FIRST)
     return None
+
+
+def _inside(here: Quadratic, point: Point) -> Quadratic:
+    """Return the cost with strengths that stay in their ranges, or where they are."""
+    first, least, most = len(point.base), *(end.copy() for end in here.ends)
+    for effect in point.effects:
+        rows = slice(first, first + effect.components)
+        low, high = effect.low / effect.scale, effect.high / effect.scale
+        least[rows] = np.maximum(least[rows], np.minimum(low, here.here[rows]))
+        most[rows] = np.minimum(most[rows], np.maximum(high, here.here[rows]))
+        first = rows.stop
+    return replace(here, ends=(least, most))
 
 
 def _tried(problem: Model, point: Point, dz: FloatArray, solved: Any) -> tuple[Point, Any] | None:

@@ -5,7 +5,7 @@ import numpy as np
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.quantities import QUANTITIES
 from tirelib.inference.diagnose.assess import Assessment, ForceAssessment
-from tirelib.inference.diagnose.forces.fit import ForceFit
+from tirelib.inference.diagnose.forces.models import ForceFit
 from tirelib.inference.diagnose.left import Left, left_of
 from tirelib.inference.identify.error_bands import levels
 from tirelib.inference.problems.force_plan import varies
@@ -57,7 +57,7 @@ def force_maps(found: ForceAssessment) -> list[Plot]:
 def _slips(assessment: ForceAssessment, model: ForceFit, name: str, title: str) -> Plot:
     """Return the mean of model less measured by slip and by set point of the other conditions."""
     case = assessment.case
-    at, unit = case.problem.bench.conditions, case.unit
+    at, unit = case.bench.conditions, case.unit
     condition = QUANTITIES["slip_ratio" if case.quantity == "Fx" else "slip_angle"]
     slip = at.slip_ratio if case.quantity == "Fx" else condition.told(at.slip_angle)
     words = condition.heading
@@ -65,7 +65,7 @@ def _slips(assessment: ForceAssessment, model: ForceFit, name: str, title: str) 
     middle, column = 0.5 * (edges[1:] + edges[:-1]), np.digitize(slip, edges) - 1
     labels, group = _rows(assessment)
     cells, first = (
-        _means(case.factor * (fit.predicted - case.problem.measured), column, group, len(labels))
+        _means(-case.factor * fit.rest, column, group, len(labels))
         for fit in (model, assessment.diagnosis.base)
     )
     figure = heat(
@@ -93,7 +93,7 @@ def _slips(assessment: ForceAssessment, model: ForceFit, name: str, title: str) 
 
 def _rows(assessment: ForceAssessment) -> tuple[list[str], IntArray]:
     """Return labels of set points and the set point of each point, by load first."""
-    at = assessment.case.problem.bench.conditions
+    at = assessment.case.bench.conditions
     keys: list[IntArray] = []
     shown: list[tuple[FloatArray, str]] = []
     for name in DIGITS:

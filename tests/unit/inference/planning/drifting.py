@@ -7,7 +7,6 @@ import numpy as np
 from tests.unit.inference.force_points import MODEL
 from tirelib.core.arrays import FloatArray
 from tirelib.inference.diagnose.forces.case import ForceCase
-from tirelib.inference.diagnose.forces.fit import MeasuredForce
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.identify.force_points import force_points
 from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
@@ -58,5 +57,5 @@ def case(kind: str, size: float, seed: int = 3) -> ForceCase:
         np.full(n, 20.0),
         time=10.0 * np.arange(n),
     )
-    problem = MeasuredForce.of(MODEL.bench(force_points(data)), "Fy", NOISE)
-    return ForceCase("in order", MODEL, problem, problem, NOISE, n // 2, ())
+    bench = MODEL.bench(force_points(data))
+    return ForceCase("in order", MODEL, "Fy", bench, bench, NOISE, n // 2, ())

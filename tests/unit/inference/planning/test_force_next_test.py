@@ -35,7 +35,7 @@ def told(kind: str, size: float) -> ForceAssessment:
 
 def envelope(made: ForceCase) -> Envelope:
     return Envelope.of(
-        made.problem.bench.conditions,
+        made.bench.conditions,
         force_axes(made),
         speed=(20.0, 20.0),
         pressure=(PRESSURES[0], PRESSURES[-1]),
@@ -101,16 +101,16 @@ def test_the_advised_point_is_the_first_pressure_once_more_at_the_end() -> None:
 
 def test_the_advised_point_leaves_the_planted_effect_alone_in_the_set() -> None:
     made, test = case(*WEAK), planned()
-    n, times = len(made.problem), 8
+    n, times = len(made.bench.points), 8
     again = np.repeat(test.points[:1], times, axis=0)
-    bench = bench_ahead(made.problem.bench, made.model, test.envelope, again)
+    bench = bench_ahead(made.bench, made.model, test.envelope, again)
     at = bench.conditions.take(np.arange(n, n + times))
     assert (at.order == 1.0).all()
     side = side_force(WEAK, at.load, at.pressure, at.slip_angle, at.order)
     side = side + NOISE * np.random.default_rng(8).standard_normal(times)
-    data = replace(bench.points.data, Fy=np.concatenate([made.problem.measured, side]))
+    data = replace(bench.points.data, Fy=np.concatenate([made.bench.points.data.Fy, side]))
     bench = replace(bench, points=replace(bench.points, data=data))
-    after = replace(made, problem=replace(made.problem, bench=bench))
+    after = replace(made, bench=bench)
     inside = {}
     for when, each in (("before", made), ("after", after)):
         among = Hypotheses(each.as_given(BRUSH), plain_tires("Fy"))
@@ -127,9 +127,12 @@ def test_points_ahead_are_seen_with_the_coefficients_of_the_present_ones() -> No
     """What may explain a residual ahead goes on as it does in the present points."""
     made, test = case(*WEAK), planned()
     problem = made.as_given(BRUSH)
-    n, more = len(made.problem), 2 * len(made.problem)  # so many that they would rule all means
+    n, more = (
+        len(made.bench.points),
+        2 * len(made.bench.points),
+    )  # they would rule all means
     wanted = np.repeat(test.points[:1], more, axis=0)
-    bench = bench_ahead(made.problem.bench, made.model, test.envelope, wanted)
+    bench = bench_ahead(made.bench, made.model, test.envelope, wanted)
     ahead = problem.followed_by(bench, np.ones(more))
     assert ahead.run_ahead.tolist() == [-1] * n + list(range(more))
     here, there = problem.solve(problem.start), ahead.solve(problem.start)
@@ -145,7 +148,7 @@ def test_points_ahead_are_seen_with_the_coefficients_of_the_present_ones() -> No
         errors.append(each.roughly(point, solved, each.slopes(point, solved), 1)[0][:, :n])
     assert errors[1] == pytest.approx(errors[0], abs=1e-4 * np.abs(errors[0]).max())
     # the same points once more behind themselves: every row is repeated
-    joint = made.problem.bench.take(np.tile(np.arange(n), 2))
+    joint = made.bench.take(np.tile(np.arange(n), 2))
     block = np.concatenate([np.arange(n), n + np.arange(n)])
     points = replace(joint.points, data=replace(joint.points.data, block=block))
     twice = problem.followed_by(replace(joint, points=points), np.ones(n))
@@ -228,7 +231,7 @@ def test_what_a_force_cannot_have_is_refused() -> None:
     made = case(*WEAK)
     with pytest.raises(ParameterError, match="low_pass acts on strain, which Fy does not show"):
         given_suspects(["low_pass"], [], CATALOGUE, "Fy")
-    at = made.problem.bench.conditions
+    at = made.bench.conditions
     with pytest.raises(ParameterError, match="a range of camber is declared"):
         Envelope.of(at, force_axes(made), camber=(0.0, 0.1))
     with pytest.raises(ParameterError, match=r"slip angle 5\.73 to -5\.73 deg"):

@@ -26,12 +26,10 @@ ANGLES = np.deg2rad([-8.0, -4.0, -1.5, 1.5, 4.0, 8.0])
 def scattered() -> ForceCase:
     """Return the same points in another order of measurement: none follows its neighbour."""
     made = case("pressure", 0.03)
-    points = made.problem.bench.points
+    points = made.bench.points
     time = np.random.default_rng(3).permutation(points.data.time)
     mixed = replace(points, data=replace(points.data, time=time))
-    return replace(
-        made, problem=replace(made.problem, bench=replace(made.problem.bench, points=mixed))
-    )
+    return replace(made, bench=replace(made.bench, points=mixed))
 
 
 @cache
@@ -42,17 +40,17 @@ def planned() -> Plan:
 
 
 def test_the_campaign_s_kind_of_run_is_told_from_the_order_of_its_points() -> None:
-    blocks = campaign_sweep(case("pressure", 0.03).problem.bench.points, "slip_angle")
+    blocks = campaign_sweep(case("pressure", 0.03).bench.points, "slip_angle")
     assert blocks is not None
     assert blocks.values == pytest.approx(ANGLES, abs=1e-3)
-    assert campaign_sweep(scattered().problem.bench.points, "slip_angle") is None
+    assert campaign_sweep(scattered().bench.points, "slip_angle") is None
     assert force_envelope(scattered(), **DECLARED).sweep is None
     assert force_envelope(scattered(), **DECLARED).points == 1
 
 
 def in_runs(slips: list[int], camber: float = 0.0) -> ForcePoints:
     """Return points in runs of so many slips, at two loads or, if it is given, two cambers."""
-    data, n = case("pressure", 0.03).problem.bench.points.data, sum(slips)
+    data, n = case("pressure", 0.03).bench.points.data, sum(slips)
     number = np.repeat(np.arange(len(slips)), slips)
     here = data.take(np.zeros(n, dtype=np.int64))
     level = np.zeros(n) if camber else 2e3 * (number % 2)
@@ -85,7 +83,7 @@ def test_most_points_are_in_runs_of_four_slips_or_each_is_a_run(
 
 
 def test_either_kind_may_be_asked_for() -> None:
-    points = scattered().problem.bench.points
+    points = scattered().bench.points
     asked = campaign_sweep(points, "slip_angle", wanted=True)
     assert asked is not None
     assert asked.values == pytest.approx(ANGLES, abs=1e-3)
@@ -93,7 +91,7 @@ def test_either_kind_may_be_asked_for() -> None:
 
 
 def test_a_sweep_there_and_back_keeps_both_directions_and_their_rates() -> None:
-    data = case("pressure", 0.03).problem.bench.points.data
+    data = case("pressure", 0.03).bench.points.data
     turn = np.concatenate([np.arange(12), np.arange(12)[::-1]])
     angle = np.linspace(-0.15, 0.15, 12)[turn]
     base = data.take(np.zeros(48, dtype=np.int64))
@@ -132,7 +130,7 @@ def test_the_points_of_a_sweep_are_one_block_and_follow_the_campaign() -> None:
     made = case("pressure", 0.03)
     envelope = force_envelope(made, **DECLARED)
     wanted = envelope.grid()[:3]
-    present, n = made.problem.bench, len(made.problem)
+    present, n = made.bench, len(made.bench.points)
     bench = bench_ahead(present, made.model, envelope, wanted)
     assert len(bench.points) == n + 3 * 6
     ahead = bench.take(np.arange(n, n + 18))
@@ -149,8 +147,8 @@ def test_the_points_of_a_sweep_are_one_block_and_follow_the_campaign() -> None:
 def test_set_points_that_are_off_alike_cost_a_sweep_more_than_independent_ones() -> None:
     """A load that is off shifts the force of all points alike, in proportion."""
     made = case("pressure", 0.03)
-    envelope, n = force_envelope(made, **DECLARED), len(made.problem)
-    bench = bench_ahead(made.problem.bench, made.model, envelope, envelope.grid()[:1])
+    envelope, n = force_envelope(made, **DECLARED), len(made.bench.points)
+    bench = bench_ahead(made.bench, made.model, envelope, envelope.grid()[:1])
     data = bench.points.data
     single = np.concatenate([data.block[:n], data.block[n] + np.arange(6)])
     apart = replace(bench, points=replace(bench.points, data=replace(data, block=single)))

@@ -1,12 +1,24 @@
 """A fit finds strengths, and what a tire shows of other effects within their ranges."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy import optimize
 
-from tests.unit.inference.statistics.linear_problem import EFFECTS, Louder, N, Toy, drawn, family
+from tests.unit.inference.statistics.linear_problem import (
+    EFFECTS,
+    Louder,
+    N,
+    Solved,
+    Toy,
+    drawn,
+    family,
+)
+from tirelib.core.errors import ParameterError
 from tirelib.inference.statistics.bounded import bounded_step
-from tirelib.inference.statistics.posterior import posterior
+from tirelib.inference.statistics.posterior import SETTLED, posterior
+from tirelib.inference.statistics.problem import Point
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 SPREAD = FAMILIES[0].shown()
@@ -31,6 +43,25 @@ def test_what_a_tire_shows_stays_within_its_range() -> None:
     assert fit.strength("twist") == pytest.approx([0.0], abs=1e-9)
     fit = posterior(Toy(0.4 * toy.by["twist"][0]), [], wide, Louder(0.001))
     assert fit.strength("twist") == pytest.approx([0.8], abs=0.05)
+
+
+class Ending(Toy):
+    """The toy whose twist has no solution below its range."""
+
+    def solve(self, point: Point, near: Any = None) -> Solved:
+        for each, strength in zip(point.effects, point.strengths, strict=True):
+            if each.name == "twist" and strength[0] < 0.0:
+                raise ParameterError("twist: it ends at zero")
+        return super().solve(point, near)
+
+
+def test_where_a_law_ends_the_other_numbers_are_fitted_all_the_same() -> None:
+    toy = Ending(np.zeros(N))
+    measured = np.array([0.5, -1.0, 2.0]) @ toy.base - 0.7 * toy.by["twist"][0]
+    fit = posterior(Ending(measured), [EFFECTS["twist"]], {}, Louder(0.001))
+    alone = posterior(Ending(measured), [], {}, Louder(0.001))
+    assert fit.strengths[0] == pytest.approx([0.0], abs=1e-9)
+    assert fit.cost == pytest.approx(alone.cost, abs=SETTLED)
 
 
 def test_a_step_between_ends_is_the_bottom_there() -> None:

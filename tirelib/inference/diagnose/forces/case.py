@@ -18,17 +18,18 @@ from tirelib.inference.compare.force_model import (
     usable_points,
 )
 from tirelib.inference.compare.forces import UNITS
-from tirelib.inference.diagnose.forces.fit import ForceFit, MeasuredForce
-from tirelib.inference.identify.force_bench import Changes
+from tirelib.inference.identify.force_bench import ForceBench
 from tirelib.inference.identify.force_data import force_data
 from tirelib.inference.identify.force_noise import force_noise
 from tirelib.inference.identify.force_notes import noise_note, taken_as_zero
 from tirelib.inference.identify.force_points import ForcePoints, force_points
-from tirelib.inference.problems.forces import ForceProblem
+from tirelib.inference.problems.forces import ForceProblem, changes_at
 
 MOST_POINTS = 4000
 """Points that are fitted; of a longer sweep passes are left out evenly."""
 LEAST_POINTS = 12
+MISFIT = 0.02
+"""Part of the measured rms that counts as noise of the brush itself when residuals are scaled."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,9 +40,11 @@ class ForceCase:
     ----------
     name : str
         Name of the campaign.
-    problem : MeasuredForce
+    quantity : str
+        Fy, Fx or Mz.
+    bench : ForceBench
         At the points that are fitted.
-    whole : MeasuredForce
+    whole : ForceBench
         At all points, for which errors are reported.
     noise : float, [N] or [N m]
         Standard deviation of a point; NaN without repeats.
@@ -49,16 +52,12 @@ class ForceCase:
 
     name: str
     model: ForceModel
-    problem: MeasuredForce
-    whole: MeasuredForce
+    quantity: str
+    bench: ForceBench
+    whole: ForceBench
     noise: float
     repeats: int
     messages: tuple[str, ...]
-
-    @property
-    def quantity(self) -> str:
-        """Fy, Fx or Mz."""
-        return self.problem.quantity
 
     @property
     def unit(self) -> str:
@@ -67,26 +66,36 @@ class ForceCase:
 
     @property
     def factor(self) -> float:
-        """Factor from an rms in SI to an error in the unit of the document."""
+        """Factor from an rms in SI to an error in the unit of documents."""
         return 1.0 / self.noise if np.isfinite(self.noise) else 1.0
 
-    def rms(self, values: Mapping[str, float], changes: Changes) -> float:
-        """Return the rms of measured less predicted over all points, SI."""
-        rest = self.whole.measured - self.whole.predict(values, changes)
-        return float(np.sqrt(np.mean(rest**2)))
+    @property
+    def size(self) -> float:
+        """Rms of the force at all points, in the unit of errors."""
+        return self.factor * _rms(getattr(self.whole.points.data, self.quantity))
 
-    def error(self, fit: ForceFit) -> float:
-        """Return the error of a fitted brush in the unit of the document."""
-        return self.factor * self.rms(fit.values, fit.changes)
+    @property
+    def scale(self) -> float:
+        """By which residuals of a fit are divided, [N] or [N m]."""
+        noise = self.noise if np.isfinite(self.noise) else 0.0
+        misfit = MISFIT * _rms(getattr(self.bench.points.data, self.quantity))
+        return max(float(np.hypot(misfit, noise)), 1e-9)
 
-    def told(self, part: float, fit: ForceFit) -> float:
-        """Return a part of a fitted brush's rms, SI, as a part of its error."""
-        return self.error(fit) * part / fit.error
+    def error(
+        self,
+        values: Mapping[str, float],
+        effects: Sequence[Effect],
+        strengths: Sequence[FloatArray],
+    ) -> float:
+        """Return the error of a brush over all points, in the unit of documents."""
+        found = self.whole.forces(values, changes_at(effects, strengths))
+        measured = getattr(self.whole.points.data, self.quantity)
+        return self.factor * _rms(measured - getattr(found, self.quantity))
 
     @property
     def given(self) -> float:
         """The error of the model as its file has it."""
-        return self.factor * self.rms(self.model.values, self.model.changes)
+        return self.error(self.model.values, self.effects, self.strengths)
 
     @property
     def effects(self) -> list[Effect]:
@@ -101,7 +110,7 @@ class ForceCase:
     def as_given(self, catalogue: Sequence[Effect]) -> ForceProblem:
         """Return the force as the inference sees it, about the model as its file has it."""
         return ForceProblem(
-            self.problem.bench,
+            self.bench,
             self.quantity,
             self.model.values,
             catalogue,
@@ -109,6 +118,10 @@ class ForceCase:
             effects=self.effects,
             strengths=self.strengths,
         )
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def force_case(
@@ -120,9 +133,7 @@ def force_case(
     """
 
     def lack(case: ForceCase) -> float:
-        if np.isfinite(case.noise):
-            return case.given
-        return case.given / float(np.sqrt(np.mean(case.whole.measured**2)))
+        return case.given if np.isfinite(case.noise) else case.given / case.size
 
     return max(force_cases(campaign, file, effects, quantity), key=lack)
 
@@ -170,7 +181,6 @@ def _case(
         )
     measured = getattr(whole.data, quantity)
     noise, _, repeats = force_noise(whole, measured)
-    messages += noise_note(quantity, noise, float(np.sqrt(np.mean(measured**2))))
-    problem = MeasuredForce.of(model.bench(points), quantity, noise)
-    every = MeasuredForce.of(model.bench(whole), quantity, noise)
-    return ForceCase(name, model, problem, every, noise, repeats, tuple(messages))
+    messages += noise_note(quantity, noise, _rms(measured))
+    benches = model.bench(points), model.bench(whole)
+    return ForceCase(name, model, quantity, *benches, noise, repeats, tuple(messages))

@@ -9,8 +9,7 @@ from tirelib.core.threads import one_thread
 from tirelib.effects import Effect
 from tirelib.inference.diagnose.diagnose import FALSE_ALARM, Finding, findings_of
 from tirelib.inference.diagnose.forces.case import ForceCase
-from tirelib.inference.diagnose.forces.fit import ForceFit
-from tirelib.inference.diagnose.forces.models import ForceModels, plain_tires
+from tirelib.inference.diagnose.forces.models import ForceFit, ForceModels, plain_tires
 from tirelib.inference.diagnose.held_out import pooled
 from tirelib.inference.statistics.select import Verdict, select
 
@@ -53,13 +52,7 @@ class ForceDiagnosis:
     @property
     def dead(self) -> Mapping[str, str]:
         """Effects that the points cannot show, with the reason."""
-        return self.models.given.dead
-
-    def error_with(self, finding: Finding) -> float:
-        """Return the rms with one effect alone, to first order unless it is named, SI."""
-        if finding.effect.name in self.alone:
-            return self.alone[finding.effect.name].error
-        return self.base.error * float(np.sqrt(max(1.0 - finding.share, 0.0)))
+        return self.models.problem.dead
 
 
 @one_thread()
@@ -81,18 +74,17 @@ def diagnose_force(
     """
     given, families = case.as_given(catalogue), plain_tires(case.quantity)
     verdict = select(given, families, false_alarm=false_alarm, many=True, progress=progress)
-    models = ForceModels(case.problem, given, false_alarm, verdict.hypotheses, progress)
-    base = models.at()
-    every = dict.fromkeys(name for names in verdict.sets for name in names)
-    alone = models.singles([verdict.hypotheses.effects[name] for name in every])
+    models = ForceModels(case, verdict.hypotheses, progress)
+    base, every = models.at(), dict.fromkeys(name for names in verdict.sets for name in names)
+    alone = models.singles(every)
+    models.find([base, *alone.values()])
     steps = _in_steps(models, verdict, alone) if verdict.sets else ()
     final = steps[-1][1] if steps else base
     if verdict.kind == "indistinguishable":
         named, steps = tuple(every), ()
     else:
         named = tuple(name for name, _ in steps)
-    rest = case.problem.measured - base.predicted
-    found = _ordered(findings_of(verdict, given, rest, lambda rows: rows), named)
+    found = _ordered(findings_of(verdict, given, base.rest, lambda rows: rows), named)
     return ForceDiagnosis(models, verdict, named, found, base, final, alone, steps)
 
 
