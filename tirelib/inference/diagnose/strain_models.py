@@ -266,13 +266,9 @@ class StrainModels(Models[Fitted, ModelError | None]):
 
         What `held` models leave on each fold is found at the same time.
         """
-        new = (
-            []
-            if fit in self._least
-            else [partial(fit.least_error, given or fit.model, self.yardstick)]
-        )
-        for found in self.find(held, new):
-            self._least[fit] = found
+        if fit not in self._least:
+            call = partial(fit.least_error, given or fit.model, self.yardstick)
+            (self._least[fit],) = self.find(held, [call])
         return self._least[fit]
 
     def held_out(self, fit: Fitted) -> tuple[float, ...]:
