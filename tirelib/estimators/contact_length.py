@@ -19,9 +19,9 @@ BIAS = 0.051
 MIDDLE, WIDTH = 0.167, 0.023
 """Angle read at which half of it is seen, and over which it comes in, [rad]."""
 LEAST_STD = 0.0075
-"""Standard deviation of a corrected angle of a long contact, [rad]; ..."""
+"""Standard deviation of a corrected angle of a long contact, [rad]."""
 SHORT_STD, SHORT_WIDTH = 0.04, 0.15
-"""... and what a short one adds at an angle of 0, falling by e over this angle, [rad]."""
+"""What a short contact adds: at an angle of 0, and the angle over which that falls by e, [rad]."""
 
 
 def contact_lengths(

@@ -21,9 +21,9 @@ from tirelib.estimators.sliding import SlidingCurve
 FREE_ROLLING = 0.02
 """Slip ratio up to which a run tells the effective rolling radius."""
 LEAST_FORCE = 0.05
-"""Range of Fy over mean Fz, and ..."""
+"""Least range of the lateral force that is fitted, over the largest load (at least 2 kN)."""
 LEAST_LOAD = 0.1
-"""... range of Fz over mean Fz, and ..."""
+"""Least range of the load from which it is fitted, over the mean load."""
 
 
 def fit_load(

@@ -11,11 +11,11 @@ with :math:`h` the rubber between belt and road and :math:`T` its temperature,
 
 The belt bends onto the road over a length that the tread's compression d allows,
 :math:`e = \sqrt{2 \rho d}` at each end. It shrinks as :math:`e \propto k^{-1/2}`, so the contact
-angle read from the strain loses :math:`e L / R` at the same load: a constant load, because the load
-grows evenly with the contact angle. The tread that wears carries the wheel where the belt is still
-bent, so it takes part in the rolling radius by the share :math:`b / \varphi` of the contact angle.
-The lateral stiffness of the tread is one of the springs behind the cornering stiffness, which
-grows as :math:`C \propto k^{0.22}`.
+angle read from the strain loses :math:`e L / R` at the same load. The estimated load then loses
+the same amount at every load, because load grows in a straight line with the contact angle. The
+tread that wears carries the wheel where the belt is still bent, so it takes part in the rolling
+radius by the share :math:`b / \varphi` of the contact angle. The lateral stiffness of the tread is one of
+the springs behind the cornering stiffness, which grows as :math:`C \propto k^{0.22}`.
 
 **Friction** acts through sliding: `tirelib.estimators.sliding`.
 

@@ -284,7 +284,7 @@ def _run(job: Job, recording: Recording) -> Run:
 def rig_header(
     name: str, tire: RigTire, chain: MeasuringChain, note: str, axes: str = "iso"
 ) -> CampaignHeader:
-    """Return the header of a campaign on the rig: its tire, its gages, what its settings hold."""
+    """Return the header of a campaign on the rig: its tire, its gages, its tolerances."""
     return CampaignHeader(
         name=name,
         axes=axes,

@@ -168,7 +168,7 @@ def _segments(stages: Sequence[Stage], time: Array) -> NDArray[np.intp]:
 def _turned(stages: Sequence[Stage], time: Array) -> Array:
     """Return the angle by which the gages have turned since the start [rad].
 
-    The belt's wind-up under torque is the gages' own way beyond the rim's.
+    Under torque the belt winds up, so the gages turn further than the rim by the wind-up.
     """
     at, omega = np.array([s.time for s in stages]), np.array([s.state.omega for s in stages])
     whole = np.concatenate(([0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(at))))

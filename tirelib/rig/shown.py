@@ -118,12 +118,12 @@ def soft_clip(shown: Shown, strength: float) -> Trace:
 
 
 def logarithmic_creep(shown: Shown, strength: float) -> Trace:
-    """Gain that creeps with the logarithm of time: 1 - a ln(1 + 9 o) / ln 10."""
+    """Gain that creeps with the logarithm of time: 1 - a ln(1 + 9 place) / ln 10."""
     return _scaled(shown.trace, 1.0 - strength * float(np.log1p(9.0 * shown.place) / np.log(10.0)))
 
 
 def eccentric_encoder(shown: Shown, strength: float) -> Trace:
-    """Sit off the mark, and off the axle by a third of that: a (1 + cos(phi - phi_e) / 3)."""
+    """Set the encoder off its mark, and off the axle by a third of that: a (1 + cos(..) / 3)."""
     by = strength * (1.0 + np.cos(shown.trace.phi - shown.angle) / 3.0)
     return _shifted(shown.trace, by)
 
@@ -151,12 +151,12 @@ def debonded(shown: Shown, strength: float) -> Trace:
 
 
 def pressure_sensitive(shown: Shown, strength: float) -> Trace:
-    """Gages whose gain goes with the inflation pressure that they lie in."""
+    """Gages whose gain changes with the inflation pressure round them."""
     return _scaled(shown.trace, 1.0 + strength * (shown.condition.pressure / 2e5 - 1.0))
 
 
 def feels_acceleration(shown: Shown, strength: float) -> Trace:
-    """Gages that feel the belt's acceleration, which goes with bending and speed squared."""
+    """Gages that feel the belt's acceleration, which grows with bending and with speed squared."""
     eps = shown.trace.strain
     bend = np.abs(eps - eps.mean(axis=0)) - eps.mean(axis=0)
     return _added(shown.trace, strength * (shown.omega / 60.0) ** 2 * bend)

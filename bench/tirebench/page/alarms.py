@@ -78,8 +78,8 @@ RULES = {
     "minutes_left": Rule("room for the recording", "min", low=10.0, hysteresis=1.0),
     "disk": Rule("free on the disk of the recording", "GB", low=1.0, hysteresis=0.1),
 }
-"""What is watched, of each wheel but for the last two, which are of the run. A starting point for
-whoever knows the rig: none of these limits was measured."""
+"""What is watched: the last two of the run, the others of each wheel. The limits are starting
+points for whoever knows the rig; none of them was measured."""
 
 
 def read_alarms(path: Path) -> dict[str, Rule]:

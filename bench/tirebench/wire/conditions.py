@@ -48,9 +48,9 @@ TRUTH = {
 HOLD = {"speed": 1.0, "omega": 1.0, "camber": 1.0}
 """How long a bus may be silent about a condition before it is unknown, [s], unless its map gives
 `hold_s`; one that is not listed is held for ever. A vehicle's bus sends its speed every 10 to
-100 ms (SAE J1939-71: wheel-based speed every 100 ms), so ten messages are missing. After half of
-it five are, and a bus that sends twice a second would come and go; after double of it a wheel that
-brakes with 8 m/s^2 is 16 m/s slower than the held speed, instead of 8 m/s."""
+100 ms (SAE J1939-71: wheel-based speed every 100 ms), so at least ten messages are missing by
+then. With half of it, the speed of a bus that sends twice a second would come and go; with double,
+a wheel that brakes with 8 m/s^2 is 16 m/s slower than the held speed, instead of 8 m/s."""
 ROUNDING = 0.6
 """Device time is a whole number of microseconds; a condition this close has begun, [us]."""
 LONGEST_MEMORY = 256

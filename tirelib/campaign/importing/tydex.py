@@ -8,7 +8,7 @@ three of these, factor f, offset of the recorded value a and offset of the physi
 
 in which an empty factor is 1 and an empty offset 0. A line that begins with ``!`` is a comment.
 
-Known difference: other blocks (``**MODELPARAMETERS`` and kin) are skipped and named in `skipped`.
+Known difference: other blocks (as ``**MODELPARAMETERS``) are skipped and named in `skipped`.
 The order of a and f above is the one that their names imply; it matters only where a is not 0.
 """
 

@@ -1,4 +1,4 @@
-"""The error of a model of strain: one number in one unit, which every verb tells.
+"""The error of a model of strain: one number in one unit, the same from every verb.
 
     error = rms of W (measured - model) over the straight runs,
 
@@ -93,7 +93,7 @@ class ModelError:
 
     @property
     def told(self) -> dict[str, Any]:
-        """The keys under which every document tells an error: value, unit, noise, raw rms."""
+        """The keys under which every document states an error: value, unit, noise, raw rms."""
         return {
             "error": self.value,
             "error_unit": self.unit,
@@ -210,7 +210,7 @@ def error_of(runs: StraightRuns, model: TireModel) -> ModelError:
 
 
 def named_errors(before: ModelError, after: ModelError) -> Mapping[str, Any]:
-    """Return the keys under which a document tells the errors before and after a change."""
+    """Return the keys under which a document states the errors before and after a change."""
     return {
         "error_unit": before.unit,
         "noise": 1e6 * before.noise,

@@ -145,7 +145,7 @@ class ForceComparison:
 
     @property
     def told(self) -> dict[str, Any]:
-        """The keys under which every document tells an error: value, unit, noise, raw rms."""
+        """The keys under which every document states an error: value, unit, noise, raw rms."""
         return {
             "error": self.error,
             "error_unit": self.error_unit,

@@ -24,7 +24,7 @@ FLAT = 0.2
 LEAST_MISFIT_SHARE, LEAST_MISFIT = 1e-3, 1e-12
 """Size below which a misfit counts as this large: over the largest, and at all."""
 SHARE_IN_RANGE = 0.7
-"""Share of the squares that the told range of angles holds."""
+"""Share of the squares that the stated range of angles holds."""
 CONDITIONS = ("load", "pressure", "speed", "slip_angle", "camber", "slip_ratio")
 BANDS = (
     (0.0, 1.0, "where most of the contact sticks"),

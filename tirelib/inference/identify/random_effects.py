@@ -1,4 +1,4 @@
-"""What differs from run to run without anybody's will: set points, gain, angle zero, noise.
+"""What differs from run to run unintentionally: set points, gain, angle zero, noise.
 
 The waveform of run i is m_i + sum_k b_ik t_ik + e_ik, where t_ik are the tangents of the model by
 load, pressure, gain and angle zero, b_ik is normal with the tolerance of the rig, and e is noise.

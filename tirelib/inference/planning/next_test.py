@@ -139,12 +139,12 @@ class NextTest:
 
     @property
     def open_pairs(self) -> tuple[PairForecast, ...]:
-        """Pairs that the present runs do not part."""
+        """Pairs that the present runs do not separate."""
         return tuple(pair for pair in self.pairs if not pair.resolved)
 
     @property
     def hopeless(self) -> bool:
-        """Whether no run parts any of the open pairs."""
+        """Whether no run separates any of the open pairs."""
         return bool(self.open_pairs) and all(
             float(np.max(pair.separation)) < LEAST_SEPARATION for pair in self.open_pairs
         )
@@ -206,7 +206,7 @@ def next_test(
     model: ForceModel | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> NextTest:
-    """Judge the runs of an envelope by how well they part suspects.
+    """Judge the runs of an envelope by how well they separate suspects.
 
     Parameters
     ----------

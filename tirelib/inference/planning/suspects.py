@@ -1,4 +1,4 @@
-"""Who is on trial: the effects of a diagnosis that its campaign does not tell apart."""
+"""The suspects: the effects of a diagnosis that its campaign does not tell apart."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ START = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Suspects:
-    """Effects on trial.
+    """Effects between which a further test is to decide.
 
     Attributes
     ----------

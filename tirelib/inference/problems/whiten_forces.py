@@ -1,4 +1,4 @@
-"""What differs from block to block of forces without anybody's will, as a covariance.
+"""What differs from block to block of forces unintentionally, as a covariance.
 
     C_b = N^2 + T_b S T_b' + m m' * K
 

@@ -1,4 +1,4 @@
-"""What differs from run to run without anybody's will, as a covariance of each run's waveform.
+"""What differs from run to run unintentionally, as a covariance of each run's waveform.
 
     C_i = N + T_i S T_i' + rho^2 a_i a_i' * K_i
 

@@ -2,7 +2,7 @@
 
 A problem holds measured numbers and a model of them. About any point of the model it gives the
 residual and everything that may explain it as rows of the same shape, and the whitening by what
-differs from run to run without anybody's will (noise, set points). The rest of this package knows
+differs from run to run unintentionally (noise, set points). The rest of this package knows
 nothing else of tires.
 """
 

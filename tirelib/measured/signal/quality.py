@@ -12,23 +12,25 @@ from tirelib.core.flags import TurnFlag
 LONGEST_BRIDGE = 2
 """Samples in a row that a straight line may replace."""
 SPIKE_SHARE = 0.05
-"""A sample is a spike when it departs from its neighbours' median by this share of the swing ..."""
+"""A sample is a spike when it departs from its neighbours' median by this share of the swing,
+and by `SPIKE_BEND` besides."""
 SPIKE_BEND = 350.0
-"""... and by this share for each squared radian of wheel angle between samples, [rad^-2]: a peak of
+"""Share of the swing for each squared radian of wheel angle between samples, [rad^-2]: a peak of
 the strain itself departs by up to 305 of it. ``python build/spike_bend.py`` has the source."""
 DEAD_SHARE = 0.25
 """A gage shows no contact when its flanks have less than this share of the median gage's steepness.
 The belt bulges over a shoulder that is lifted off the road, so a strain that only swings is no
 contact. ``python build/cosim/lifted_shoulder.py`` has half and double."""
 FLAT_ANGLE = 0.04
-"""A gage is saturated when it stands still at its extreme over this wheel angle, [rad]..."""
+"""A gage is saturated when it stands still at its extreme over this wheel angle, [rad], and over
+`FLAT_SAMPLES`, and then leaves it abruptly (`CORNER_ANGLE`)."""
 FLAT_SAMPLES = 6
-"""... and over at least this many samples."""
+"""Least number of samples over which a saturated gage stands still."""
 CORNER_ANGLE = 0.02
-"""... and within this wheel angle, [rad], after the flat part the strain has left it ..."""
+"""Wheel angle after the flat part, [rad], within which a saturated gage has left it."""
 CORNER_SHARE = 0.02
-"""... by this share of the swing. A rounded peak of a quantised signal may stand still, too, but
-leaves slowly."""
+"""Share of the swing by which it has left it. A rounded peak of a quantised signal may stand still,
+too, but leaves slowly."""
 UNUSABLE = TurnFlag.GAP | TurnFlag.SATURATED | TurnFlag.DEAD_GAGE
 """Flags with which a gage is not used in a turn."""
 
