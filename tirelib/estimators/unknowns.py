@@ -14,8 +14,8 @@ The belt bends onto the road over a length that the tread's compression d allows
 angle read from the strain loses :math:`e L / R` at the same load. The estimated load then loses
 the same amount at every load, because load grows in a straight line with the contact angle. The
 tread that wears carries the wheel where the belt is still bent, so it takes part in the rolling
-radius by the share :math:`b / \varphi` of the contact angle. The lateral stiffness of the tread is one of
-the springs behind the cornering stiffness, which grows as :math:`C \propto k^{0.22}`.
+radius by the share :math:`b / \varphi` of the contact angle. The lateral stiffness of the tread is
+one of the springs behind the cornering stiffness, which grows as :math:`C \propto k^{0.22}`.
 
 **Friction** acts through sliding: `tirelib.estimators.sliding`.
 

@@ -21,14 +21,18 @@ def dense(rows: dict[str, np.ndarray], variance: dict[str, float]) -> np.ndarray
     return total
 
 
-def test_what_a_block_takes_is_its_density_beside_the_volume_of_its_prior(case: tuple) -> None:
+@pytest.mark.parametrize("size", [1, 2])
+def test_what_a_block_takes_is_its_density_beside_the_volume_of_its_prior(
+    case: tuple, size: int
+) -> None:
     rest, _, rows = case
+    rows = {**rows, "one": rows["one"][:size]}
     normal = Normal.of(rows, rest, lambda block: block)
     before, more = {"base": 9.0, "one": 0.01}, 0.25
     weighed = Weighed(normal, normal.spread(before))
     block = normal.blocks["one"]
-    found = taken(weighed.gram, weighed.right(normal.right)[:, None], block, np.full(2, more))[0]
-    volume = np.linalg.slogdet(np.eye(2) + more * weighed.gram[block, block])[1]
+    found = taken(weighed.gram, weighed.right(normal.right)[:, None], block, np.full(size, more))[0]
+    volume = np.linalg.slogdet(np.eye(size) + more * weighed.gram[block, block])[1]
     densities = [
         stats.multivariate_normal(cov=dense(rows, {**before, "one": one})).logpdf(rest)
         for one in (0.01 + more, 0.01)
@@ -48,6 +52,18 @@ def test_likelihood_is_that_of_the_samples(case: tuple) -> None:
         for spread in ({"base": 9.0, "one": 0.5}, {"base": 1.0})
     ]
     assert found[0] - found[1] == pytest.approx(wanted[0] - wanted[1], abs=1e-8)
+
+
+def test_what_has_coefficients_taken_off_is_the_residual_without_them(case: tuple) -> None:
+    rest, _, rows = case
+    found = (
+        Normal.of(rows, rest).about({"one": 0.7, "absent": 3.0}).about({"base": -0.2, "one": 0.1})
+    )
+    mean = np.array([-0.2] * 4 + [0.8] * 2)
+    wanted = Normal.of(rows, rest - mean @ np.concatenate(list(rows.values())))
+    assert found.right == pytest.approx(wanted.right)
+    assert found.square == pytest.approx(wanted.square)
+    assert found.mean == pytest.approx(mean)
 
 
 def test_draws_have_the_posterior(case: tuple) -> None:
