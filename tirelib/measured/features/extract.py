@@ -62,7 +62,7 @@ class Features(TurnValues):
         First moment of the strain about the middle of the contact over e_vertical, [rad]: zero for
         a symmetric contact.
     omega, speed, pressure, camber
-        TraceConditions of the turn, SI; all but the pressure are those at its contact.
+        Conditions of the turn, SI; all but the pressure are those at its contact.
     axis_shift
         Wheel angle of the pulse's middle, from a trigger, [rad].
     lateral : shape (n_gages,), [m]
