@@ -141,6 +141,25 @@ def test_a_gage_without_a_contact_says_nothing() -> None:
     assert np.isfinite(found.contact_angle[1:, 1:]).all()
 
 
+def test_features_say_of_turns_what_the_turns_say() -> None:
+    turns = cut_turns(record()[0], RATE, LATERAL)
+    turns.trace.axis_shift[:] = np.linspace(-0.01, 0.02, len(turns))
+    found = extract_features(turns)
+    for name in (
+        "time",
+        "ready",
+        "period",
+        "angle_std",
+        "slip_std",
+        "offset",
+        "offset_std",
+        "mean",
+    ):
+        np.testing.assert_array_equal(getattr(found, name), getattr(turns, name))
+    np.testing.assert_array_equal(found.axis_shift, turns.trace.axis_shift)
+    np.testing.assert_array_equal(found.omega, turns.trace.conditions.omega)
+
+
 def test_a_weak_edge_is_flagged() -> None:
     phi = np.linspace(0, 1, 50)
     _, _, border = peak(phi, np.ones(50, bool), 0.0, 0.02)
