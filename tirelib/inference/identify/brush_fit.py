@@ -26,7 +26,7 @@ from tirelib.inference.identify.force_data import FORCES, ForceData
 from tirelib.inference.identify.ring_patch import ring_half
 
 LOAD_RATIO = 1.1
-"""Least ratio of loads that tells anything of the law."""
+"""Least ratio of the largest load to the smallest from which the power of the load is fitted."""
 LIMIT = 0.5
 """Uncertainty up to which a parameter counts as identified, relative to its size."""
 _START_POINTS = 4000

@@ -14,32 +14,15 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import TirelibError
 from tirelib.effects import Effect
 from tirelib.effects.brush_state import BrushState
-from tirelib.inference.identify.brush_law import SPECS
 from tirelib.inference.identify.discrepancy import bumps
 from tirelib.inference.identify.force_bench import Changes, ForceBench
+from tirelib.inference.problems.force_constants import fitted_constants, moved_constants
 from tirelib.inference.problems.force_plan import SPANS, blind, varies
 from tirelib.inference.problems.whiten_forces import PointWhitener
 from tirelib.inference.statistics.problem import Point
 from tirelib.model.brush import brush_forces
 from tirelib.model.brush_slopes import STATE_STEP, StateSlopes, moment_of
 
-COORDINATES: Mapping[str, tuple[str, ...]] = {
-    "Fy": ("lateral_stiffness", "friction", "load_power", "slip_angle_offset", "Fy_offset"),
-    "Fx": ("longitudinal_stiffness", "friction", "load_power", "slip_ratio_offset", "Fx_offset"),
-    "Mz": (
-        "lateral_stiffness",
-        "friction",
-        "half_length",
-        "load_power",
-        "slip_angle_offset",
-        "Mz_offset",
-    ),
-}
-"""Constants that are fitted with each force; the others stay as the model has them."""
-OF_CONTACT = ("half_length", "load_power")
-"""Constants that have no part where a ring gives the contact's length."""
-LOAD_RATIO = 1.1
-"""Range of the load from which its power is fitted."""
 WIDTH = 1.0
 """Prior standard deviation of a coordinate."""
 SET_POINTS = {"load": 0.005, "pressure": 0.005, "slip_ratio": 0.01}
@@ -378,26 +361,6 @@ class ForceProblem:
         if whole < LEAST_SIGNAL:
             return f"changes {self.quantity} at no point by more than noise"
         return "the brush's own parameters change the force alike at these conditions"
-
-
-def fitted_constants(bench: ForceBench, quantity: str) -> tuple[str, ...]:
-    """Return the constants of the brush that points of a force can fit."""
-    load = bench.conditions.load
-    out = OF_CONTACT if bench.half is not None else ()
-    if load.max() < LOAD_RATIO * load.min():
-        out = (*out, "load_power")
-    return tuple(name for name in COORDINATES[quantity] if name not in out)
-
-
-def moved_constants(
-    values: Mapping[str, float], names: Sequence[str], moves: FloatArray
-) -> dict[str, float]:
-    """Return constants with the named ones moved: by factors exp(move), or by sizes."""
-    out = dict(values)
-    for name, move in zip(names, moves, strict=True):
-        spec, old = SPECS[name], out.get(name, 0.0)
-        out[name] = old * float(np.exp(move)) if spec.log else old + spec.size * float(move)
-    return out
 
 
 def slip_of(state: BrushState, quantity: str) -> FloatArray:
