@@ -67,9 +67,9 @@ MEAN = {"centrifugal_tension": 1.0}
 OWN = 0.004
 """A run's own misfit over its rms strain, in the contact."""
 LEAST_STEP = 1e-3
-NEAR = 0.05
+STRENGTH_MOVE = 0.05
 """Move of a strength, in ranges, within which what it adds to the slopes is kept."""
-NEAR_BASE = 0.03
+BASE_MOVE = 0.03
 """The same of the base's coordinates."""
 UNKNOWN_NOISE = 0.005
 """Noise over the rms strain where there are no repeats."""
@@ -147,12 +147,12 @@ class _Added:
         if self.point is point or not near:
             return self.point is point
         same = self.point.effects == point.effects
-        near = float(np.abs(self.point.base - point.base).max()) < NEAR_BASE
+        near = float(np.abs(self.point.base - point.base).max()) < BASE_MOVE
         return (
             same
             and near
             and all(
-                float(np.abs(a - b).max()) < NEAR * effect.scale
+                float(np.abs(a - b).max()) < STRENGTH_MOVE * effect.scale
                 for effect, a, b in zip(
                     point.effects, self.point.strengths, point.strengths, strict=True
                 )
@@ -417,7 +417,8 @@ class StrainProblem:
     def _bends(self, point: Point) -> bool:
         """Return whether effects are strong enough to matter to the slopes of the base."""
         return any(
-            effect.hook in ("contact", "strain") and float(np.abs(s).max()) >= NEAR * effect.scale
+            effect.hook in ("contact", "strain")
+            and float(np.abs(s).max()) >= STRENGTH_MOVE * effect.scale
             for effect, s in zip(point.effects, point.strengths, strict=True)
         )
 

@@ -19,7 +19,7 @@ from scipy import linalg
 
 from tirelib.core.arrays import FloatArray
 
-LEAST = 1e-11
+LEAST_VARIANCE = 1e-11
 """Variance that stands for none: so little that no sample tells it from zero."""
 
 
@@ -97,12 +97,12 @@ class Weighed:
     ----------
     normal : Normal
     spread : shape (m,)
-        Diagonal of D. A variance below `LEAST` counts as `LEAST`.
+        Diagonal of D. A variance below `LEAST_VARIANCE` counts as `LEAST_VARIANCE`.
     """
 
     def __init__(self, normal: Normal, spread: FloatArray) -> None:
         self.normal = normal
-        self.root = np.sqrt(np.maximum(spread, LEAST))
+        self.root = np.sqrt(np.maximum(spread, LEAST_VARIANCE))
         inner = self.root[:, None] * normal.gram * self.root
         inner.flat[:: self.root.size + 1] += 1.0
         self.lower: FloatArray = linalg.cholesky(inner, lower=True, check_finite=False)

@@ -19,7 +19,7 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError
 from tirelib.effects import Effect
 from tirelib.inference.statistics.downhill import Whiten, downhill
-from tirelib.inference.statistics.normal import LEAST, Normal, Weighed
+from tirelib.inference.statistics.normal import LEAST_VARIANCE, Normal, Weighed
 from tirelib.inference.statistics.plain import BASE, ROUGHLY, View
 from tirelib.inference.statistics.problem import Model, Point, Problem
 from tirelib.inference.statistics.quadratic import Ends, Quadratic
@@ -41,7 +41,7 @@ FAR, LOOSE = 10.0, 0.03
 """A model that leaves more than `FAR` of what noise leaves is settled by steps that bring less than
 `LOOSE` of that surplus: it lacks something strong, and how near it comes to the runs without that
 decides nothing."""
-NEAR, FOLLOWED = 1.0, 25
+WHITENING_MOVE, WHITENING_STEPS = 1.0, 25
 """Move of a coordinate, in standard deviations, below which a whitening that follows the fit is
 kept, for it hardly changes any more; and steps after which it is kept in any case: following the
 solution, a fit may go in circles."""
@@ -191,7 +191,8 @@ def posterior(
         Turns rows (k, ...) into whitened ones (k, n), for instance `Problem.whitener`.
     follow : callable, optional
         Gives a whitening about a solution. It is asked for until a step moves every coordinate by
-        less than `NEAR`, or after `FOLLOWED` steps; the given whitening is the first one.
+        less than `WHITENING_MOVE`, or after `WHITENING_STEPS` steps; the given whitening is the
+        first one.
     near : Posterior, optional
         A fit nearby.
     start : Point, optional
@@ -222,7 +223,7 @@ def posterior(
     asked = slice(len(point.base), len(width) - sum(e.components for e in others))
     idle, moved = 0, np.inf
     for count in range(MOST_STEPS):
-        if follow is not None and 0 < count <= FOLLOWED and moved > NEAR:
+        if follow is not None and 0 < count <= WHITENING_STEPS and moved > WHITENING_MOVE:
             whiten = follow(solved)
             whitened, rest = _white(whiten, problem.remainder(point, solved)), whiten(solved.rest)
         rows = {BASE: whiten(slopes), **whitened}
@@ -349,7 +350,9 @@ def _widths(
 ) -> FloatArray:
     """Return the standard deviations of all coordinates' priors."""
     each = [problem.widths, np.ones(sum(e.components for e in effects))]
-    each += [np.full(e.components, np.sqrt(max(spread.get(e.name, 0.0), LEAST))) for e in others]
+    each += [
+        np.full(e.components, np.sqrt(max(spread.get(e.name, 0.0), LEAST_VARIANCE))) for e in others
+    ]
     return np.concatenate(each)
 
 

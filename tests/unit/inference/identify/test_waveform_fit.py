@@ -269,8 +269,8 @@ def test_a_whitening_that_follows_the_solution_is_kept_in_the_end(
         return whole(self, here)
 
     monkeypatch.setattr(WaveformProblem, "whitening", whitening)
-    monkeypatch.setattr(posterior, "NEAR", 0.0)  # as if every step were a long one
-    monkeypatch.setattr(posterior, "FOLLOWED", 3)
+    monkeypatch.setattr(posterior, "WHITENING_MOVE", 0.0)  # as if every step were a long one
+    monkeypatch.setattr(posterior, "WHITENING_STEPS", 3)
     fit = plain(data(loads=LOADS[::2]))
     assert fit.steps > 3
     assert len(asked) == 1 + 3
