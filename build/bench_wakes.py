@@ -5,8 +5,8 @@
 Blocks of a wheel at 10 kHz go through the bench's queue into a process that does nothing but wait
 for them, then one that also takes them from the queue, one that unpickles them, one that prepares
 the steps of the FMU, and one that takes these steps. Each is timed alone. The last two lines are
-all of it once more: with 10 ms more between two looks, and with blocks that lie ready, so without a
-pause.
+all of it once more: as the bench does it, resting until the next turn may be due, and with blocks
+that lie ready, so without a pause.
 """
 
 import argparse
@@ -27,6 +27,7 @@ from tirebench.estimator.estimation import WheelEstimation
 from tirebench.estimator.fmu_archive import read_fmu
 from tirebench.estimator.fmu_model import FmuFile, FmuModel
 from tirebench.estimator.wheels import Block
+from tirebench.live.estimator import rest
 from tirebench.live.exchange import FINISH, Address, Exchange, woken
 from tirebench.live.supervised import CONTEXT, orphaned, settled
 from tirebench.wire.conditions import Conditions
@@ -35,7 +36,7 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.threads import one_thread
 from tirelib.fmu.build import build_fmu
 
-RATE, SAMPLES, NAP = 1e4, 16, 0.01
+RATE, SAMPLES = 1e4, 16
 WAITS, TAKES, UNPICKLES, PREPARES, STEPS = range(5)
 SAID = ("waits", "takes", "unpickles", "prepares steps", "steps the FMU")
 
@@ -50,7 +51,7 @@ class _NoModel:
     def step(self, *_: Any) -> None: ...
 
 
-def work(does: int, said: str, nap: float, file: FmuFile, address: Address, rate: float) -> None:
+def work(does: int, said: str, rests: bool, file: FmuFile, address: Address, rate: float) -> None:
     """Do as much as an estimator process does, and print what it costs."""
     exchange = Exchange(address)
     queue, model = exchange.samples[0], FmuModel(file) if does == STEPS else _NoModel()
@@ -59,20 +60,22 @@ def work(does: int, said: str, nap: float, file: FmuFile, address: Address, rate
     address.news.release()
     woken(address.fresh[0], 60.0)
     wakes = blocks = 0
+    came, length = [float("nan")] * 2, float("nan")  # when the last two turns came
     begin, used = time.monotonic(), time.process_time()
     while not orphaned():
         while does > WAITS and (message := queue.read()) is not None:
             blocks += 1
             if does >= UNPICKLES:
                 block: Block = pickle.loads(message)
-            if does >= PREPARES:
-                estimation.take(block)
+            if does >= PREPARES and estimation.take(block).turns and rests:
+                came = [came[1], 1e-9 * block.arrival]
+                length = came[1] - came[0]
             queue.take()
         if exchange.is_set(FINISH):
             break
         wakes += 1
+        time.sleep(rest(time.monotonic() - came[1], length))
         woken(address.fresh[0], 0.1)
-        time.sleep(nap)
     used, length = time.process_time() - used, time.monotonic() - begin
     each = used / (blocks or wakes)
     sys.stdout.write(
@@ -118,12 +121,12 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         fmu = build_fmu(live.calibration_file(), Path(folder) / "x.fmu", samples_per_step=SAMPLES)
         with FmuFile(read_fmu(fmu)) as file:
-            parts = [(does, said, 0.0, True) for does, said in enumerate(SAID)]
-            parts += [(STEPS, "looks later", NAP, True), (STEPS, "without a pause", 0.0, False)]
-            for does, said, nap, pause in parts:
+            parts = [(does, said, False, True) for does, said in enumerate(SAID)]
+            parts += [(STEPS, "rests", True, True), (STEPS, "without a pause", False, False)]
+            for does, said, rests, pause in parts:
                 exchange = Exchange.create(CONTEXT, 1)
                 process = CONTEXT.Process(
-                    target=work, args=(does, said, nap, file, exchange.address, given.rate)
+                    target=work, args=(does, said, rests, file, exchange.address, given.rate)
                 )
                 process.start()
                 exchange.address.news.acquire()

@@ -1,29 +1,37 @@
 #include "any_road.h"
 
+#include <float.h>
+
+#include "linear.h"
+#include "order.h"
+
 enum { POINTS = NODES + WHOLE + 1 };
 
 /* Slips that may be, with the shares that slide and how likely they are. */
 typedef struct {
     double slip[POINTS], t[POINTS], weight[POINTS], angle[POINTS];
+    double faded[POINTS]; /* (1 - t) to the power of the curve's fading */
     double across; /* slip on the calibrated road; last of the slips */
 } Possible;
 
-/* Minus the logarithm of a normal likelihood. Reference: _surprise */
-static double surprise_of(double apart, double variance) {
-    if (!isfinite(variance) || !isfinite(apart)) return 0.0;
-    return 0.5 * (apart * apart / variance + log(variance));
+/* Minus the logarithm of two normal likelihoods. Reference: _surprise, twice */
+static double surprise_of(const double apart[2], const double variance[2]) {
+    double square = 0.0, product = 1.0;
+    for (int i = 0; i < 2; i++) {
+        if (!isfinite(variance[i]) || !isfinite(apart[i])) continue; /* nothing is known */
+        square += apart[i] * apart[i] / variance[i];
+        product *= variance[i];
+    }
+    return 0.5 * (square + log(product));
 }
 
 static double square(double x) { return x * x; }
 
 /* Reference: _moments */
 static double moments(const double *x, const double *weight, double *variance) {
-    double sum = 0.0, mean = 0.0, square = 0.0;
-    for (int i = 0; i < POINTS; i++) sum += weight[i];
-    for (int i = 0; i < POINTS; i++) mean += weight[i] * x[i];
-    mean /= sum;
-    for (int i = 0; i < POINTS; i++) square += weight[i] * ((x[i] - mean) * (x[i] - mean));
-    *variance = square / sum;
+    double sum = total(weight, POINTS), mean = dot(weight, x, POINTS) / sum, square[POINTS];
+    for (int i = 0; i < POINTS; i++) square[i] = (x[i] - mean) * (x[i] - mean);
+    *variance = dot(weight, square, POINTS) / sum;
     return mean;
 }
 
@@ -38,8 +46,10 @@ static void possible(const Calibration *cal, const SlidingCurve *c, const Seen *
     double high = curve_share(c, k, used, slippery, s->load, along);
     for (int i = 0; i < NODES; i++) {
         double t = low + 0.5 * (high - low) * (cal->node[i] + 1.0);
-        double filled = maximum(1.0 - pow(1.0 - t, n), k->tiny);
+        double rest = log(maximum(1.0 - t, DBL_MIN)); /* for two powers of 1 - t */
+        double filled = maximum(1.0 - exp(n * rest), k->tiny);
         p->t[i] = t;
+        p->faded[i] = exp(c->fading * rest);
         p->slip[i] = used / cornering * (t > 0.0 ? n * t / filled : 1.0); /* curve_across */
         p->weight[i] =
             n * used / (cornering * (filled * filled)) * 0.5 * (high - low) * cal->weight[i];
@@ -57,6 +67,7 @@ static void possible(const Calibration *cal, const SlidingCurve *c, const Seen *
     p->across = curve_lateral(c, k, used, c->friction, s->load, along, &p->t[last]);
     p->slip[last] = p->across;
     p->weight[last] = 0.0 * used;
+    for (int i = NODES; i < POINTS; i++) p->faded[i] = pow(1.0 - p->t[i], c->fading);
     for (int i = 0; i < POINTS; i++) {
         p->angle[i] = angle_of(k, p->slip[i], s->slip_ratio);
         p->weight[i] *= sqrt(square(pulled / p->slip[i]) + 1.0);
@@ -71,15 +82,15 @@ static double weigh(const Calibration *cal, const SlidingCurve *c, const Seen *s
     const Constants *k = &cal->constants;
     double surprise[POINTS], least = INFINITY, stiffer = curve_stiffer(c, k, s->load);
     double of_moment = square(s->moment_std), of_pull = square(s->pull_std);
-    double dry = used * pow(1.0 - p->t[POINTS - 1], c->fading);
+    double dry = used * p->faded[POINTS - 1];
     for (int i = 0; i < POINTS; i++) {
         /* a regression of one road shows a part only of what another takes from the moment */
-        double aligned = used * pow(1.0 - p->t[i], c->fading), taken = s->unseen * (dry - aligned);
-        double apart = s->moment - aligned - k->hidden * taken;
-        double expected = used * along / p->slip[i], unsure = used * stiffer / p->slip[i];
+        double aligned = used * p->faded[i], taken = s->unseen * (dry - aligned);
+        double by_slip = used / p->slip[i], expected = by_slip * along, unsure = by_slip * stiffer;
         double slanted = square(c->slant * expected) + square(unsure * s->slip_std);
-        surprise[i] = surprise_of(apart, of_moment + square(k->hidden_doubt * taken));
-        surprise[i] += surprise_of(s->pull - expected, of_pull + slanted);
+        double apart[2] = {s->moment - aligned - k->hidden * taken, s->pull - expected};
+        double variance[2] = {of_moment + square(k->hidden_doubt * taken), of_pull + slanted};
+        surprise[i] = surprise_of(apart, variance);
         least = minimum(least, surprise[i]);
     }
     for (int i = 0; i < POINTS; i++) p->weight[i] *= exp(least - surprise[i]);

@@ -56,4 +56,10 @@ static inline double phi_at(int index) {
     return index < ANGLES - 1 ? index * ((0.8 - -1.0) / (ANGLES - 1)) + -1.0 : 0.8;
 }
 
+/* A place of the grid just before a wheel angle, from which to look for it; 0 for NaN. */
+static inline int phi_before(double angle) {
+    double near = (angle - phi_at(0)) / (phi_at(1) - phi_at(0)) - 1.0;
+    return near > 0.0 ? near < ANGLES ? (int)near : ANGLES - 1 : 0;
+}
+
 #endif

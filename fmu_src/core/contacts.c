@@ -1,5 +1,7 @@
 #include "contacts.h"
 
+#include "order.h"
+
 static const double RISE = 0.7, FALL = 0.62, JUMP = 2.5, GAP_REACH = 0.1, PATIENCE = 2.5;
 static const double SMALLEST_SWING = 5e-4, SLEW = 32.0, LEAST_SLEW = 0.1, PULSES = 250.0;
 static const double LONGEST_BURST = 0.02, SHORTER = 0.5;
@@ -119,10 +121,10 @@ static int finished(ContactFinder *f, const Ring *ring, double last, Contact *fo
 
 /* ContactFinder._until_burst: return a sample, or the good one that stands for it. */
 static double without_burst(ContactFinder *f, const Ring *ring, double y) {
-    double good = f->count ? *ring_seen(ring, f->count - 1) : NAN;
-    double steep = SLEW * (2.0 * PI / f->last_period);
+    double good = f->count ? *ring_seen(ring, f->count - 1) : NAN, apart = fabs(y - good);
     int known = f->levels && f->periods && f->whole == 3;
-    if (!known || !(fabs(y - good) > f->swing * (steep > LEAST_SLEW ? steep : LEAST_SLEW)) ||
+    if (!known || !(apart > f->swing * LEAST_SLEW) || /* nearly always, and quickly told */
+        !(apart > f->swing * (SLEW * (2.0 * PI / f->last_period))) ||
         !((double)f->apart < LONGEST_BURST * f->last_period)) {
         f->apart = 0;
         return y;
@@ -134,10 +136,11 @@ static double without_burst(ContactFinder *f, const Ring *ring, double y) {
     return good;
 }
 
-/* ContactFinder._until_jump: the swing outgrows the levels. */
-static void look_for_jump(ContactFinder *f, double y) {
-    double low = y < f->lowest ? y : f->lowest, high = y > f->highest ? y : f->highest;
-    if (!f->levels || high - low <= JUMP * f->swing) return;
+/* ContactFinder._until_jump: an extreme with which the swing outgrows the levels. */
+static void take_extreme(ContactFinder *f, double y) {
+    if (y < f->lowest) f->lowest = y;
+    if (y > f->highest) f->highest = y;
+    if (!f->levels || f->highest - f->lowest <= JUMP * f->swing) return;
     f->levels = f->middles = f->periods = 0;
     f->armed = 1;
 }
@@ -149,9 +152,7 @@ static int advance(ContactFinder *f, const Ring *ring, double y, Contact *found)
         f->since = ++f->count;
         return 0;
     }
-    look_for_jump(f, y);
-    if (y < f->lowest) f->lowest = y;
-    if (y > f->highest) f->highest = y;
+    if (y < f->lowest || y > f->highest) take_extreme(f, y);
     if (f->levels) {
         above = y > f->level;
         below = y < f->low_level;
@@ -199,4 +200,29 @@ int finder_take(ContactFinder *f, const Ring *ring, Contact *found) {
     y = without_burst(f, ring, y);
     *ring_seen(ring, f->count) = y;
     return advance(f, ring, y, found);
+}
+
+int finder_skip(ContactFinder *f, Ring *ring, const double *x) {
+    double y[QUIET + 1], step[QUIET], low, high, unused, steepest;
+    int lost = 0, turning = f->levels && f->periods && f->armed && !f->pulse && f->whole == 3;
+    if (!turning || room(f) <= QUIET + 1 || ring->place + QUIET > ring->capacity) return 0;
+    y[0] = *ring_seen(ring, f->count - 1);
+    for (int i = 0; i < QUIET; i++) lost += !isfinite(x[i]);
+    for (int i = 0; i < QUIET; i++) y[i + 1] = median_of_three(x[i - 2], x[i - 1], x[i]);
+    for (int i = 0; i < QUIET; i++) step[i] = fabs(y[i + 1] - y[i]);
+    limits(y + 1, QUIET, &low, &high);
+    limits(step, QUIET, &unused, &steepest);
+    low = low < f->lowest ? low : f->lowest;
+    if (lost || !(high <= f->level) || !(steepest <= f->swing * LEAST_SLEW)) return 0;
+    high = high > f->highest ? high : f->highest;
+    if (high - low > JUMP * f->swing) return 0;
+    ring_skip(ring, QUIET);
+    for (int i = 0; i < QUIET; i++) *ring_seen(ring, f->count + i) = y[i + 1];
+    f->lowest = low;
+    f->highest = high;
+    f->count += QUIET;
+    f->apart = 0;
+    f->tail[0] = x[QUIET - 2];
+    f->tail[1] = f->held = x[QUIET - 1];
+    return 1;
 }

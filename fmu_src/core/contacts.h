@@ -41,6 +41,14 @@ void finder_start(ContactFinder *finder, int64_t longest_turn, int centre);
  * ContactFinder.push; test: test_native_turns. */
 int finder_take(ContactFinder *finder, const Ring *ring, Contact *found);
 
+/* Samples of a record that are looked at together where nothing happens. */
+enum { QUIET = 32 };
+
+/* Take the next QUIET samples of a record, of which `x` are the centre gage's. Where no contact
+ * begins and none is missing or stands apart, do what ring_take and finder_take do with each of them
+ * and return 1; else do nothing and return 0. */
+int finder_skip(ContactFinder *finder, Ring *ring, const double *x);
+
 double contact_middle(const Contact *contact);
 
 #endif

@@ -3,6 +3,7 @@
 #include <float.h>
 
 #include "linear.h"
+#include "order.h"
 
 enum { DEGREE = 3, FEWEST = 3, BINS = 64 };
 
@@ -49,9 +50,7 @@ static int gathered(const double *samples, size_t n, double *y, double *at) {
     size_t edge = 0;
     for (int i = 0; i < bins; i++) {
         size_t next = i + 1 < bins ? (size_t)((i + 1) * step) : n;
-        y[i] = 0.0;
-        for (size_t k = edge; k < next; k++) y[i] += samples[k];
-        y[i] /= (double)(next - edge);
+        y[i] = total(samples + edge, next - edge) / (double)(next - edge);
         at[i] = 0.5 * (double)(edge + next - 1);
         edge = next;
     }
@@ -93,15 +92,12 @@ static Course no_course(const double *samples, size_t n, double first, int told)
 
 Course course(const double *samples, size_t n, double first, double turn) {
     Course c = {0, 0, 0, {0.0}, NAN, 0.0};
-    double low = INFINITY, high = -INFINITY, y[BINS], z[BINS], fitted[4], terms[4][4];
-    size_t changes = 0;
-    for (size_t i = 0; i < n; i++) {
-        if (!isfinite(samples[i])) return c;
-        if (samples[i] < low) low = samples[i];
-        if (samples[i] > high) high = samples[i];
-        if (i && samples[i] != samples[i - 1]) changes++;
-    }
-    if (n == 0 || low * high <= 0.0) return c;
+    double low, high, y[BINS], z[BINS], fitted[4], terms[4][4];
+    size_t lost = 0, changes = 0;
+    limits(samples, n, &low, &high);
+    for (size_t i = 0; i < n; i++) lost += !isfinite(samples[i]);
+    for (size_t i = 1; i < n; i++) changes += samples[i] != samples[i - 1];
+    if (n == 0 || lost || low * high <= 0.0) return c;
     if (changes + 1 < FEWEST) return no_course(samples, n, first, (int)changes + 1);
     int bins = gathered(samples, n, y, z);
     double late = 0.5 * ((double)n / (double)(changes + 1) - 1.0);

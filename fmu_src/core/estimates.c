@@ -48,16 +48,18 @@ static Said by_chain(const Calibration *cal, const Chain *c, const Turn *turn,
     double values[MOVES][VALUES];
     Prediction found[MOVES];
     Said said = {0, 0, 0, 0, NAN};
-    for (int m = 0; m < MOVES; m++) {
+    int measured = !(features->flags & INVALIDATING);
+    for (int m = 0; m < (measured ? MOVES : 1); m++) {
         compute_regressors(cal, c, turn, features, m, values[m]);
         chain_predict(cal, c, values[m], scratch, &found[m]);
     }
-    said.unlike = chain_unlike(cal, c, values, &found[AS_READ], turn->angle_std);
     said.traction = values[AS_READ][V_TRACTION];
-    said.extrapolated = extrapolated(&c->laws, k, values[AS_READ]) ||
-                        (c->force.there && extrapolated(&c->force_laws, k, values[AS_READ]));
     said.unknown = condition_unknown(c, values[AS_READ]);
     e->radius = found[AS_READ].radius;
+    if (!measured) return said; /* what else there is to say would be of no use */
+    said.unlike = chain_unlike(cal, c, values, &found[AS_READ], turn->angle_std);
+    said.extrapolated = extrapolated(&c->laws, k, values[AS_READ]) ||
+                        (c->force.there && extrapolated(&c->force_laws, k, values[AS_READ]));
     for (int q = 0; q < QUANTITIES; q++) {
         const Estimate *here = &found[AS_READ].of[q];
         if (!here->there) continue;

@@ -10,22 +10,16 @@ typedef struct {
     int at_border;
 } Peak;
 
-/* The first wheel angle of the grid that is not below another. */
-static int first_from(double low) {
-    double near = (low - phi_at(0)) / (phi_at(1) - phi_at(0)) - 1.0;
-    int k = near > 0.0 ? near < ANGLES ? (int)near : ANGLES : 0;
-    while (k < ANGLES && !(phi_at(k) >= low)) k++;
-    return k;
-}
-
 /* Largest of sign * y where the wheel angle is from `low` to `high`, refined by a parabola.
  * Reference: tirelib.measured.features.peaks.peak */
 static Peak peak(const double *y, double sign, double low, double high) {
     Peak found = {NAN, NAN, 0};
     double start = phi_at(0), spacing = phi_at(1) - phi_at(0), highest = -INFINITY;
-    int index = -1;
-    for (int k = first_from(low); k < ANGLES && phi_at(k) <= high; k++)
-        if (isfinite(y[k]) && sign * y[k] > highest) highest = sign * y[k], index = k;
+    int index = -1, first = phi_before(low), stop = phi_before(high);
+    while (first < ANGLES && !(phi_at(first) >= low)) first++;
+    while (stop < ANGLES && phi_at(stop) <= high) stop++;
+    for (int k = first; k < stop; k++)
+        if (sign * y[k] > highest && isfinite(y[k])) highest = sign * y[k], index = k;
     if (index < 0) return found;
     int at = index < 1 ? 1 : index > ANGLES - 2 ? ANGLES - 2 : index;
     double a = sign * y[at - 1], b = sign * y[at], c = sign * y[at + 1];

@@ -1,5 +1,6 @@
 #include "lowpass.h"
 
+#include "linear.h"
 #include "order.h"
 
 static const double SUPPORT = 4.0;
@@ -49,45 +50,38 @@ int filter_start(Filter *filter, const double *angle, size_t n, double sigma, in
     return angle[0] <= first - width && angle[n - 1] >= last + width;
 }
 
-/* Weights of the samples from `start` to before `stop` about a wheel angle, exp(-d^2 / 2 sigma^2).
+/* Weights of the samples from `start` to before `stop` about a wheel angle, exp(-d^2 / 2 sigma^2),
+ * and their arms, weight times distance.
  * Those before `known` were weighed about the angle before, a spacing h less: there the weight grows
  * by exp(h d / sigma^2 - h^2 / 2 sigma^2), and that by exp(-h^2 / sigma^2), so that a sample costs
  * two exponentials as it comes in and none later. */
 static void weigh_samples(const Filter *filter, double phi, size_t start, size_t known, size_t stop,
-                          double *weight, double *growth) {
+                          double *weight, double *growth, double *arm) {
     double h = phi_at(1) - phi_at(0), narrow = 1.0 / (filter->sigma * filter->sigma);
     double slower = exp(-h * h * narrow);
     for (size_t i = start; i < known; i++) {
         weight[i] *= growth[i];
         growth[i] *= slower;
+        arm[i] = weight[i] * (filter->angle[i] - phi);
     }
     for (size_t i = known > start ? known : start; i < stop; i++) {
         double distance = filter->angle[i] - phi;
         weight[i] = exp(-0.5 * distance * distance * narrow);
         growth[i] = exp((distance - 0.5 * h) * h * narrow);
+        arm[i] = weight[i] * distance;
     }
 }
 
-/* Sums of weighted samples, and of them times their distance from a wheel angle; returns the sum of
- * the weights times the square of that distance. */
-static double add_samples(const double *rows, size_t lanes, const double *weight,
-                          const double *angle, double phi, size_t n, double *plain,
-                          double *moment) {
-    double sum[LANES] = {0.0}, moved[LANES] = {0.0}, second = 0.0;
+/* Sums of n samples, weighted and times their arms. */
+static void add_samples(const double *rows, size_t lanes, const double *weight, const double *arm,
+                        size_t n, double *plain, double *moment) {
+    double sum[LANES] = {0.0}, moved[LANES] = {0.0};
     for (size_t i = 0; i < n; i++) {
-        const double *sample = rows + i * lanes;
-        double distance = angle[i] - phi, share = weight[i], arm = share * distance;
-        second += arm * distance;
-        for (int g = 0; g < LANES; g++) {
-            sum[g] += sample[g] * share;
-            moved[g] += sample[g] * arm;
-        }
+        for (size_t g = 0; g < LANES; g++) sum[g] += rows[i * lanes + g] * weight[i];
+        for (size_t g = 0; g < LANES; g++) moved[g] += rows[i * lanes + g] * arm[i];
     }
-    for (int g = 0; g < LANES; g++) {
-        plain[g] = sum[g];
-        moment[g] = moved[g];
-    }
-    return second;
+    for (size_t g = 0; g < LANES; g++) plain[g] = sum[g];
+    for (size_t g = 0; g < LANES; g++) moment[g] = moved[g];
 }
 
 void filter_rows(const Filter *filter, const double *samples, size_t stride, int gages,
@@ -101,23 +95,25 @@ void filter_rows(const Filter *filter, const double *samples, size_t stride, int
 
 void filter_turn(const Filter *filter, const double *rows, int gages, double *strain, double *rate,
                  double *scratch) {
-    double *weight = scratch, *growth = weight + filter->n, plain[MOST_LANES], moment[MOST_LANES];
+    double *weight = scratch, *growth = weight + filter->n, *arm = growth + filter->n;
+    double plain[MOST_LANES], moment[MOST_LANES];
     size_t size = 2 * filter->reach + 1, lanes = filter_lanes(gages), place = 1, known = 0;
     for (int k = 0; k < filter->angles; k++) {
         double phi = phi_at(k);
         size_t start = nearest(filter, phi, &place) - filter->reach;
-        weigh_samples(filter, phi, start, known, start + size, weight, growth);
+        weigh_samples(filter, phi, start, known, start + size, weight, growth, arm);
         known = start + size;
-        double second = 0.0;
         for (size_t g = 0; g < lanes; g += LANES)
-            second = add_samples(rows + start * lanes + g, lanes, weight + start,
-                                 filter->angle + start, phi, size, plain + g, moment + g);
-        double total = plain[gages], first = moment[gages];
-        double mean = first / total; /* of the distance: the weights are not quite symmetric */
+            add_samples(rows + start * lanes + g, lanes, weight + start, arm + start, size,
+                        plain + g, moment + g);
+        double share = 1.0 / plain[gages], first = moment[gages];
+        double mean = first * share; /* of the distance: the weights are not quite symmetric */
+        double second = dot(arm + start, filter->angle + start, size) - phi * first;
+        double steepness = 1.0 / (second - mean * first);
         for (int g = 0; g < gages; g++) {
-            double slope = (moment[g] - mean * plain[g]) / (second - mean * first);
+            double slope = (moment[g] - mean * plain[g]) * steepness;
             rate[g * ANGLES + k] = slope;
-            strain[g * ANGLES + k] = plain[g] / total - mean * slope;
+            strain[g * ANGLES + k] = plain[g] * share - mean * slope;
         }
     }
 }

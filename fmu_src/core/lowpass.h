@@ -47,7 +47,7 @@ void filter_rows(const Filter *filter, const double *samples, size_t stride, int
                  double *rows);
 
 /* Filter all gages at the wheel angles: strain[g * ANGLES + k] and rate[g * ANGLES + k] of gage g at
- * angle k; `scratch` holds 2 n doubles. Reference: smooth_to_angle; test: test_native_turns. */
+ * angle k; `scratch` holds 3 n doubles. Reference: smooth_to_angle; test: test_native_turns. */
 void filter_turn(const Filter *filter, const double *rows, int gages, double *strain, double *rate,
                  double *scratch);
 

@@ -1,5 +1,6 @@
 #include "polynomial.h"
 
+#include "linear.h"
 #include "order.h"
 
 double standardised(const Form *form, int variable, const double *values) {
@@ -25,19 +26,13 @@ void design(const Form *form, const double *values, double *terms) {
     }
 }
 
-/* Variance that uncertain coefficients leave, from the half of the covariance below its diagonal;
- * four sums at once, which do not wait for each other. Reference: leverage */
+/* Variance that uncertain coefficients leave, from the half of the covariance below its diagonal.
+ * Reference: leverage */
 static double leverage(const double *x, const double *covariance, int n) {
     double variance = 0.0;
     for (int i = 0; i < n; i++) {
         const double *row = covariance + i * n;
-        double sum[4] = {0.0};
-        int j = 0;
-        for (; j + 4 <= i; j += 4)
-            for (int k = 0; k < 4; k++) sum[k] += row[j + k] * x[j + k];
-        for (; j < i; j++) sum[0] += row[j] * x[j];
-        double below = (sum[0] + sum[1]) + (sum[2] + sum[3]);
-        variance += x[i] * (row[i] * x[i] + 2.0 * below);
+        variance += x[i] * (row[i] * x[i] + 2.0 * dot(row, x, (size_t)i));
     }
     return variance;
 }

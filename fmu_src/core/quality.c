@@ -73,25 +73,6 @@ static void bridge(double *x, const unsigned char *missing, size_t n) {
     for (size_t k = known == n ? 0 : known + 1; k < n; k++) x[k] = known == n ? 0.0 : x[known];
 }
 
-/* Lowest and highest of the samples that are there, four at a time. */
-static void limits(const double *x, size_t n, double *low, double *high) {
-    double lows[4], highs[4];
-    size_t i = 0;
-    for (int k = 0; k < 4; k++) lows[k] = INFINITY, highs[k] = -INFINITY;
-    for (; i + 4 <= n; i += 4)
-        for (int k = 0; k < 4; k++) {
-            double y = x[i + (size_t)k];
-            lows[k] = y < lows[k] ? y : lows[k];
-            highs[k] = y > highs[k] ? y : highs[k];
-        }
-    for (; i < n; i++) {
-        lows[0] = x[i] < lows[0] ? x[i] : lows[0];
-        highs[0] = x[i] > highs[0] ? x[i] : highs[0];
-    }
-    *low = fmin(fmin(lows[0], lows[1]), fmin(lows[2], lows[3]));
-    *high = fmax(fmax(highs[0], highs[1]), fmax(highs[2], highs[3]));
-}
-
 /* Swing of the samples that are there, and whether they stand still at its ends. */
 static double swing_of(const double *x, size_t n, double step, int *flags) {
     double low, high;
@@ -149,11 +130,8 @@ void inspect(double *window, size_t stride, size_t n, int gages, double step, in
 void mark_without_contact(const double *rate, size_t n, int gages, int *flags) {
     double steep[GAGES], sorted[GAGES];
     for (int g = 0; g < gages; g++) {
-        double low = INFINITY, high = -INFINITY;
-        for (size_t i = 0; i < n; i++) {
-            if (rate[g * ANGLES + i] < low) low = rate[g * ANGLES + i];
-            if (rate[g * ANGLES + i] > high) high = rate[g * ANGLES + i];
-        }
+        double low, high;
+        limits(rate + g * ANGLES, n, &low, &high);
         steep[g] = sorted[g] = high - low;
     }
     double usual = median(sorted, (size_t)gages);

@@ -25,6 +25,13 @@ void ring_take(Ring *ring, const Column *columns, int64_t at) {
     if (++ring->place == ring->capacity) ring->place = 0;
 }
 
+void ring_skip(Ring *ring, int samples) {
+    for (int i = 0; i < samples; i++) ring->seen[ring->place + i] = NAN;
+    ring->total += samples;
+    ring->place += samples;
+    if (ring->place == ring->capacity) ring->place = 0;
+}
+
 int64_t ring_base(const Ring *ring) {
     return ring->total > ring->capacity ? ring->total - ring->capacity : 0;
 }

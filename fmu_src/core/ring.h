@@ -32,6 +32,9 @@ void ring_start(Ring *ring, double *memory, int gages, int64_t capacity);
  * is the sample that follows those before. */
 void ring_take(Ring *ring, const Column *columns, int64_t at);
 
+/* Take samples of a record that lie before the ring's end. */
+void ring_skip(Ring *ring, int samples);
+
 /* Return the number of the oldest sample that is kept. */
 int64_t ring_base(const Ring *ring);
 

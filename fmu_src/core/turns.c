@@ -23,7 +23,7 @@ size_t cutter_size(int gages, double rate) {
     if (gages < 1 || gages > GAGES || !(rate >= 1.0 && rate <= 1e6)) return 0;
     size_t n = (size_t)capacity_of(rate);
     size_t doubles = ring_size(gages, capacity_of(rate)) +
-                     ((size_t)gages + filter_lanes(gages) + 3) * n;
+                     ((size_t)gages + filter_lanes(gages) + 4) * n;
     return sizeof(Cutter) + doubles * sizeof(double) + (size_t)places_of(rate) * sizeof(Contact) + n;
 }
 
@@ -45,7 +45,7 @@ Cutter *cutter_start(void *memory, int gages, const double *lateral, double rate
     c->window = next, next += gages * c->room;
     c->rows = next, next += filter_lanes(gages) * n;
     c->angle = next, next += c->room;
-    c->scratch = next, next += 2 * c->room;
+    c->scratch = next, next += 3 * c->room;
     c->waiting = (Contact *)(void *)next;
     c->missing = (unsigned char *)(c->waiting + c->places);
     finder_start(&c->finder, longest_turn(rate), c->centre);
@@ -69,7 +69,7 @@ static double pulse_of(const Contact *contact, const AngleLaw *law) {
 
 /* How many wheel angles of the grid are looked at with a pulse. */
 static int angles_seen(double pulse) {
-    int n = 0;
+    int n = phi_before(pulse + AFTER);
     while (n < ANGLES && pulse + AFTER >= phi_at(n)) n++;
     return n;
 }
@@ -131,16 +131,6 @@ static size_t only_finite(double *out, const double *x, size_t n) {
     return count;
 }
 
-/* Four sums at once, which do not wait for each other. */
-static double sum_of(const double *x, size_t n) {
-    double sum[4] = {0.0};
-    size_t i = 0;
-    for (; i + 4 <= n; i += 4)
-        for (int k = 0; k < 4; k++) sum[k] += x[i + (size_t)k];
-    for (; i < n; i++) sum[0] += x[i];
-    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
-}
-
 /* Mean or median of a column between two sample numbers; `gap` where too much is missing.
  * Reference: LastSamples._mean */
 static double mean_of(const Cutter *c, int column, double start, double stop, int robust,
@@ -149,18 +139,25 @@ static double mean_of(const Cutter *c, int column, double start, double stop, in
     if (b > c->ring.total) b = c->ring.total;
     size_t n = b > a ? (size_t)(b - a) : 0;
     const double *x = ring_look(&c->ring, column, a, b, c->scratch);
-    double sum = robust ? NAN : sum_of(x, n), needed = (1.0 - LARGEST_MISSING) * (double)n;
+    double sum = robust ? NAN : total(x, n), needed = (1.0 - LARGEST_MISSING) * (double)n;
     *gap = 0;
     if (n > 0 && isfinite(sum)) return sum / (double)n; /* none is missing */
     size_t count = only_finite(c->scratch, x, n);
     *gap = (double)count < (needed > 1.0 ? needed : 1.0);
     if (*gap) return NAN;
-    return robust ? median(c->scratch, count) : sum_of(c->scratch, count) / (double)count;
+    return robust ? median(c->scratch, count) : total(c->scratch, count) / (double)count;
 }
 
 static double held_mean(const Cutter *c, int condition, double start, double stop) {
     int gap;
     return mean_of(c, ring_held(&c->ring, condition), start, stop, 0, &gap);
+}
+
+/* No curves from a wheel angle of the grid on. */
+static void no_curves(Turn *turn, int gages, int from) {
+    for (int g = 0; g < gages; g++)
+        for (int i = g * ANGLES + from; i < (g + 1) * ANGLES; i++)
+            turn->strain[i] = turn->rate[i] = NAN;
 }
 
 /* Strain and rate over wheel angle, and the gages' flags. Reference: TurnCutter._window */
@@ -176,6 +173,7 @@ static int window_of(Cutter *c, Turn *turn, double sigma) {
     law_angles(&c->law, (double)first, n, c->angle);
     if (!filter_start(&filter, c->angle, n, sigma, seen, c->scratch)) return 0;
     filter_rows(&filter, c->window, stride, c->gages, c->rows);
+    no_curves(turn, c->gages, seen);
     filter_turn(&filter, c->rows, c->gages, turn->strain, turn->rate, c->scratch);
     mark_without_contact(turn->rate, (size_t)seen, c->gages, turn->gage_flags);
     return 1;
@@ -215,12 +213,12 @@ static void follow_offset(Cutter *c, const double *opposite, Turn *turn, double 
 /* Wheel angle of the contact's middle from the trigger. Reference: TurnCutter._trigger */
 static void look_at_trigger(const Cutter *c, double start, double stop, Turn *turn) {
     int64_t a = kept_from(c, whole(rint(start))), b = whole(rint(stop)), top = 0;
-    int column = ring_trigger(&c->ring), times = 0;
+    const double *on = ring_look(&c->ring, ring_trigger(&c->ring), a, b, c->scratch);
+    int times = 0;
     turn->axis_shift = NAN;
     for (int64_t i = a; i < b; i++) {
-        double on = ring_at(&c->ring, column, i);
-        if (isnan(on)) return;
-        if (i > a && on > 0.5 && ring_at(&c->ring, column, i - 1) <= 0.5) times++, top = i;
+        if (isnan(on[i - a])) return;
+        if (i > a && on[i - a] > 0.5 && on[i - a - 1] <= 0.5) times++, top = i;
     }
     if (a >= b) return;
     if (times == 1)
@@ -238,13 +236,13 @@ static void nothing_known(Turn *turn, int gages) {
         turn->offset[g] = turn->offset_std[g] = turn->mean[g] = NAN;
         turn->gage_flags[g] = 0;
     }
-    for (int i = 0; i < gages * ANGLES; i++) turn->strain[i] = turn->rate[i] = NAN;
     turn->flags = 0;
 }
 
 /* Reference: unknown_turn */
 static void first_turn(const Cutter *c, const Contact *contact, Turn *turn) {
     nothing_known(turn, c->gages);
+    no_curves(turn, c->gages, 0);
     turn->time = contact_middle(contact) / c->rate;
     turn->ready = contact->fall / c->rate;
     turn->flags = FIRST_TURN | (contact->burst ? SPIKE : 0);
@@ -287,16 +285,14 @@ static void take_strain(Cutter *c, double start, double stop, Turn *turn) {
     follow_offset(c, opposite, turn, moved);
     for (int g = 0; g < c->gages; g++) {
         int unusable = (turn->gage_flags[g] & UNUSABLE) != 0;
-        double low = 0.0, high = 0.0;
+        double *strain = turn->strain + g * ANGLES, *rate = turn->rate + g * ANGLES, low, high;
         out += unusable;
-        for (int k = g * ANGLES; k < (g + 1) * ANGLES; k++) {
-            turn->strain[k] = unusable ? NAN : turn->strain[k] - turn->offset[g];
-            if (unusable) turn->rate[k] = NAN;
-            if (turn->strain[k] < low) low = turn->strain[k];
-            if (turn->strain[k] > high) high = turn->strain[k];
-        }
+        for (int k = 0; k < ANGLES; k++) strain[k] = unusable ? NAN : strain[k] - turn->offset[g];
+        for (int k = 0; k < ANGLES && unusable; k++) rate[k] = NAN;
+        limits(strain, ANGLES, &low, &high);
+        double swing = fmax(high, 0.0) - fmin(low, 0.0);
         turn->mean[g] = unusable ? NAN : mean[g] - turn->offset[g];
-        if (!unusable && fabs(moved[g]) > DRIFT_SHARE * (high - low)) turn->gage_flags[g] |= DRIFT;
+        if (!unusable && fabs(moved[g]) > DRIFT_SHARE * swing) turn->gage_flags[g] |= DRIFT;
         turn->flags |= turn->gage_flags[g];
     }
     if (out > 1 || (turn->gage_flags[c->centre] & UNUSABLE))
@@ -336,7 +332,10 @@ static int full_turn(Cutter *c, const Contact *contact, const Contact *before, T
     turn->angle_std = c->law.std;
     turn->pulse = pulse_of(contact, &c->law);
     if (isnan(turn->pulse)) turn->flags |= ACCELERATING; /* so much that its angle is unknown */
-    if (!isnan(sigma) && !isnan(turn->pulse) && !window_of(c, turn, sigma)) return 0;
+    if (isnan(sigma) || isnan(turn->pulse))
+        no_curves(turn, c->gages, 0);
+    else if (!window_of(c, turn, sigma))
+        return 0;
     take_strain(c, start, stop, turn);
     take_slip(c, before, turn);
     take_conditions(c, contact, start, stop, turn);
@@ -400,9 +399,17 @@ int cutter_next(Cutter *c, Turn *turn) {
 
 int cutter_run(Cutter *c, const Column *columns, int64_t n, int64_t *taken, Turn *turn) {
     int found = cutter_next(c, turn);
+    const Column *centre = c->ring.record ? columns + c->centre : NULL;
     while (!found && *taken < n) {
-        if (!cutter_take(c, columns, (*taken)++)) return -1;
-        if (c->queued) found = cutter_next(c, turn);
+        int together = centre && centre->step == 1 && !c->queued && n - *taken >= QUIET;
+        if (together && finder_skip(&c->finder, &c->ring, centre->first + *taken)) {
+            *taken += QUIET;
+            continue;
+        }
+        for (int i = 0; i < QUIET && !found && *taken < n; i++) {
+            if (!cutter_take(c, columns, (*taken)++)) return -1;
+            if (c->queued) found = cutter_next(c, turn);
+        }
     }
     return found;
 }

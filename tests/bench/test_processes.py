@@ -30,7 +30,7 @@ from tirebench.estimator.wheels import Block, Wheels
 from tirebench.links import BACK, LOST, RESUMED, Read
 from tirebench.links.opening import PortPlan
 from tirebench.live.chain import LiveChain
-from tirebench.live.estimator import EstimatorPlan, Report, _Estimator
+from tirebench.live.estimator import LOOK, EstimatorPlan, Report, _Estimator, rest
 from tirebench.live.exchange import Address, Exchange
 from tirebench.live.live_plan import LivePlan
 from tirebench.live.reader import ReaderPlan, load
@@ -229,6 +229,21 @@ def test_a_cable_in_and_out_is_told_and_every_time_it_comes_back(
     events = [read.event for read in recording.reads() if read.event]
     recording.close()
     assert events[:6] == [LOST, BACK] * 3
+
+
+@pytest.mark.parametrize(
+    ("since", "length", "wanted"),
+    [(0.01, 0.11, 0.089), (0.1, 0.11, 0.0), (0.2, 0.11, 0.0), (0.0, 3.0, LOOK)],
+)
+def test_an_estimator_rests_until_a_turn_may_be_due(
+    since: float, length: float, wanted: float
+) -> None:
+    """A turn that is a tenth shorter than the last one is taken at once."""
+    assert rest(since, length) == pytest.approx(wanted)
+
+
+def test_an_estimator_that_knows_no_turn_does_not_rest() -> None:
+    assert rest(0.01, float("nan")) == rest(float("nan"), 0.11) == 0.0
 
 
 class Turns:

@@ -3,8 +3,9 @@
  *
  * With libFuzzer (clang -fsanitize=fuzzer) it is the target. Without, -DALONE, it makes its own
  * bytes: fuzz SEED INPUTS, the same ones for a seed. The folder FUZZ holds what it starts from:
- * StrainTire.core of an FMU, and samples.bin, doubles, five gages a sample. ONLY tries one thing:
- * 0 calibrations, 1 steps, 2 states, 3 FMI 3.0, 4 virtual tires, 5 FMI 2.0. */
+ * StrainTire.core of an FMU, samples.bin, doubles, five gages a sample, and the folder `virtual` with
+ * VirtualTire.core; both folders have an empty one, `damaged`. ONLY tries one thing: 0 calibrations,
+ * 1 steps, 2 states, 3 FMI 3.0, 4 virtual tires, 5 FMI 2.0, 6 FMI 2.0 of virtual tires. */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -54,11 +55,19 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance, const fmi3Byte[], size_t, fmi3F
 
 enum { SAMPLES = 10, MOST_SAMPLES = 400 };
 
-static Resources own, tire;
-static char *file;
-static size_t file_size, samples;
+/* What an FMU carries: its folder, its file without the hash, what stands in it. */
+typedef struct {
+    char folder[4096];
+    const char *name;
+    char *file;
+    size_t size;
+    Resources known;
+} Carried;
+
+static Carried wheel = {.name = "StrainTire.core"}, rolling = {.name = "VirtualTire.core"};
+static const Resources *const own = &wheel.known, *const tire = &rolling.known;
+static size_t samples;
 static double *strain;
-static char folder[4096];
 
 enum { BEHIND = 17 }; /* start values behind a surface */
 
@@ -126,10 +135,10 @@ static void play(Wheel *w, int gages, Source *s, int steps) {
 
 /* A calibration of which numbers are changed, or whose end is missing. */
 static void try_table(Source *s) {
-    size_t n = own.numbers;
+    size_t n = own->numbers;
     double *table = memory(n * sizeof *table);
     Calibration *known = memory(sizeof *known);
-    memcpy(table, own.table, n * sizeof *table);
+    memcpy(table, own->table, n * sizeof *table);
     for (int edits = (int)byte_of(s) % 6; edits >= 0; edits--) {
         size_t at = byte_of(s) < 128 ? place_of(s, 700) : place_of(s, n);
         int counts = byte_of(s) < 128; /* something that says how many, or which */
@@ -165,7 +174,7 @@ static double rate_of(Source *s) {
 /* Wild samples, conditions, steps and rates. */
 static void try_steps(Source *s) {
     Calibration *known = memory(sizeof *known);
-    if (calibration_read(known, own.table, own.numbers)) exit(4);
+    if (calibration_read(known, own->table, own->numbers)) exit(4);
     double rate = rate_of(s);
     Wheel *w = wheel_of(known, rate, (int)byte_of(s) % 3);
     play(w, known->gages, s, 1 + (int)place_of(s, 600));
@@ -176,7 +185,7 @@ static void try_steps(Source *s) {
 /* States of a wheel that has seen wild steps: whole, damaged and cut short. */
 static void try_states(Source *s) {
     Calibration *known = memory(sizeof *known);
-    if (calibration_read(known, own.table, own.numbers)) exit(4);
+    if (calibration_read(known, own->table, own->numbers)) exit(4);
     double rate = rate_of(s);
     Wheel *w = wheel_of(known, rate, (int)byte_of(s) % 3), *other = wheel_of(known, rate, w->axes);
     for (int rounds = (int)byte_of(s) % 4; rounds >= 0; rounds--) {
@@ -201,11 +210,11 @@ static void try_states(Source *s) {
 
 /* A response surface of which numbers are changed, wild options, conditions and steps. */
 static void try_tire(Source *s) {
-    size_t n = tire.numbers - BEHIND;
+    size_t n = tire->numbers - BEHIND;
     double *table = memory(n * sizeof *table), in[MOST_INPUTS], most;
     RollingTire *w = memory(sizeof *w);
     TireSurface surface;
-    memcpy(table, tire.table, n * sizeof *table);
+    memcpy(table, tire->table, n * sizeof *table);
     for (int edits = (int)byte_of(s) % 4; edits > 0; edits--) {
         size_t at = byte_of(s) < 160 ? place_of(s, 60) : place_of(s, n);
         table[at] = number_of(s, table[at]);
@@ -234,11 +243,11 @@ static void said(fmi2Environment e, fmi2String name, fmi2Status status, fmi2Stri
     if (strlen(text) > 1u << 20) abort();
 }
 
-static void write_core(Source *s, const char *path) {
-    char *bytes = memory(file_size);
-    size_t n = file_size;
+static void write_damaged(Source *s, const Carried *of, const char *path) {
+    char *bytes = memory(of->size);
+    size_t n = of->size;
     FILE *out = fopen(path, "wb");
-    memcpy(bytes, file, n);
+    memcpy(bytes, of->file, n);
     for (int edits = (int)byte_of(s) % 8; edits > 0; edits--) {
         size_t at = byte_of(s) < 200 ? place_of(s, 6000) : place_of(s, n);
         bytes[at < n ? at : 0] = (char)byte_of(s);
@@ -250,28 +259,26 @@ static void write_core(Source *s, const char *path) {
 }
 
 /* Calls of FMI in any order, on whole or damaged resources. */
-static void try_fmi(Source *s) {
+static void try_fmi(Source *s, const Carried *of, unsigned often_damaged) {
     char path[4200], other[4300], uri[64];
     const char *texts[] = {"", "iso", "sae", "adapted_sae", "live tire", "%s%n", "/nowhere", other};
     fmi2CallbackFunctions host = {said, NULL, NULL, NULL, NULL};
     fmi2FMUstate state = NULL;
-    fmi2String guid = own.guid, text;
-    int damaged = byte_of(s) < 64;
-    snprintf(path, sizeof path, "%s%s", folder, damaged ? "/damaged" : "");
-    if (damaged) {
-        char name[4300];
-        snprintf(name, sizeof name, "%s/StrainTire.core", path);
-        write_core(s, name);
-    }
-    snprintf(other, sizeof other, "%s/StrainTire.core", path); /* as another calibration */
+    fmi2String guid = of->known.guid, text;
+    int damaged = byte_of(s) < often_damaged;
+    snprintf(path, sizeof path, "%s%s", of->folder, damaged ? "/damaged" : "");
+    snprintf(other, sizeof other, "%s/%s", path, of->name); /* as another calibration */
+    if (damaged) write_damaged(s, of, other);
     for (size_t i = 0; i < sizeof uri - 1; i++) uri[i] = (char)byte_of(s);
     uri[sizeof uri - 1] = 0;
     fmi2FreeInstance(fmi2Instantiate("w", fmi2CoSimulation, guid, uri, &host, 0, 0));
     fmi2Component c = fmi2Instantiate("w", fmi2CoSimulation, guid, path, &host, 0, 0);
     if (byte_of(s) < 220) fmi2ExitInitializationMode(c);
     for (int calls = 0; c && calls < 60 && s->at < s->end; calls++) {
-        unsigned r = byte_of(s) < 240 ? (unsigned)place_of(s, own.variables + 2) : ~0u;
-        double real = number_of(s, 1.0);
+        unsigned r = byte_of(s) < 240 ? (unsigned)place_of(s, of->known.variables + 2) : ~0u;
+        double real = 1.0;
+        fmi2GetReal(c, &r, 1, &real); /* near what the variable is, or far away */
+        real = number_of(s, real);
         int whole = (int)byte_of(s) - 20;
         text = texts[byte_of(s) % 8];
         switch (byte_of(s) % 12) {
@@ -307,11 +314,11 @@ static void try_fmi3(Source *s) {
     double values[2 * SAMPLES * GAGES] = {0.0}, time;
     fmi3FMUState state = NULL;
     bool flag[5];
-    fmi3Instance c = fmi3InstantiateCoSimulation("w", own.guid, folder, false, false,
+    fmi3Instance c = fmi3InstantiateCoSimulation("w", own->guid, wheel.folder, false, false,
                                                  byte_of(s) < 128, false, NULL, 0, NULL, NULL, NULL);
     if (byte_of(s) < 220) fmi3ExitInitializationMode(c);
     for (int calls = 0; c && calls < 60 && s->at < s->end; calls++) {
-        unsigned r[2] = {(unsigned)place_of(s, own.variables + 3), 6};
+        unsigned r[2] = {(unsigned)place_of(s, own->variables + 3), 6};
         size_t n = byte_of(s) < 200 ? 1 : 2;
         size_t m = byte_of(s) < 128 ? n : place_of(s, 2 * SAMPLES * GAGES);
         fmi3String text = byte_of(s) < 128 ? "sae" : "%s%n";
@@ -344,9 +351,9 @@ static void try_fmi3(Source *s) {
     fmi3FreeInstance(c);
 }
 
-static char *whole_file(const char *name, size_t *n) {
+static char *whole_file(const char *in_folder, const char *name, size_t *n) {
     char path[4200];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
+    snprintf(path, sizeof path, "%s/%s", in_folder, name);
     FILE *in = fopen(path, "rb");
     if (!in || fseek(in, 0, SEEK_END)) exit(2);
     *n = (size_t)ftell(in);
@@ -357,32 +364,38 @@ static char *whole_file(const char *name, size_t *n) {
     return bytes;
 }
 
+static void carry(Carried *of, const char *inside) {
+    char path[4300];
+    size_t format = 14;
+    snprintf(of->folder, sizeof of->folder, "%s%s", getenv("FUZZ") ? getenv("FUZZ") : ".", inside);
+    snprintf(path, sizeof path, "%s/%s", of->folder, of->name);
+    of->file = whole_file(of->folder, of->name, &of->size);
+    size_t first = (size_t)((char *)memchr(of->file, '\n', of->size) - of->file);
+    memmove(of->file + format, of->file + first, of->size - first); /* without its hash */
+    of->size -= first - format;
+    if (resources_read(&of->known, path)) exit(2);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     Source s = {data, data + size};
-    if (!file) {
+    if (!wheel.file) {
         size_t n;
-        char path[4200];
-        snprintf(folder, sizeof folder, "%s", getenv("FUZZ") ? getenv("FUZZ") : ".");
-        file = whole_file("StrainTire.core", &file_size);
-        size_t first = (size_t)((char *)memchr(file, '\n', file_size) - file), format = 14;
-        memmove(file + format, file + first, file_size - first); /* without its hash */
-        file_size -= first - format;
-        strain = (double *)(void *)whole_file("samples.bin", &n);
+        carry(&wheel, "");
+        carry(&rolling, "/virtual");
+        strain = (double *)(void *)whole_file(wheel.folder, "samples.bin", &n);
         samples = n / sizeof(double) / 5;
-        snprintf(path, sizeof path, "%s/StrainTire.core", folder);
-        if (resources_read(&own, path) || !samples) exit(2);
-        snprintf(path, sizeof path, "%s/VirtualTire.core", folder);
-        if (resources_read(&tire, path) || tire.numbers <= BEHIND) exit(2);
+        if (!samples || tire->numbers <= BEHIND) exit(2);
     }
     const char *only = getenv("ONLY");
-    switch (only ? (unsigned)atoi(only) : byte_of(&s) % 6) {
+    switch (only ? (unsigned)atoi(only) : byte_of(&s) % 7) {
     case 0: try_table(&s); break;
     case 1: try_steps(&s); break;
     case 2: try_states(&s); break;
     case 3: try_fmi3(&s); break;
     case 4: try_tire(&s); break;
-    default: try_fmi(&s);
+    case 5: try_fmi(&s, &wheel, 64); break;
+    default: try_fmi(&s, &rolling, 8); /* its file is large */
     }
     return 0;
 }

@@ -1,6 +1,7 @@
 """What the library computes with its compiled core is what its numpy reference computes."""
 
 import json
+import pickle
 import warnings
 from collections.abc import Iterator
 from dataclasses import fields, replace
@@ -9,9 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
 
 import tirelib.core.compiled
 from tests.fmu import live
+from tests.native.test_native_turns import SEQUENCES, sequences
 from tests.native.test_native_wheel import KINDS, spoilt
 from tests.synthetic import LATERAL, frames
 from tirelib.core.compiled import Core, loaded_core
@@ -88,6 +91,24 @@ def test_a_record_has_the_turns_features_and_estimates_of_numpy(kind: str) -> No
     estimates = known.estimate(features)
     assert_alike(estimates, known.reference_estimate(features))
     assert len(estimates.notes) == len(wanted) >= 3
+
+
+@given(case=sequences())
+@settings(max_examples=SEQUENCES)
+def test_samples_that_are_looked_at_together_say_the_same(
+    case: tuple[np.ndarray, dict[str, Any]],
+) -> None:
+    """The finder skips samples in which nothing happens where they lie in one piece."""
+    strain, held = case
+    found = []
+    for laid in (np.ascontiguousarray, np.asfortranarray):
+        try:
+            turns = cut_turns(laid(strain), 2e3, (0.04, 0.0, -0.04), **held)
+        except ParameterError as error:
+            found.append(str(error))
+        else:
+            found.append(pickle.dumps(turns))
+    assert found[0] == found[1]
 
 
 def test_more_turns_than_a_block_and_no_turn_at_all() -> None:

@@ -41,13 +41,14 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def fed(program: Path) -> Path:
     """What the driver starts from: an FMU's numbers, and samples of a wheel."""
     folder = program.parent / "fed"
-    (folder / "damaged").mkdir(parents=True)
+    for place in (folder, folder / "virtual"):
+        (place / "damaged").mkdir(parents=True)
     with zipfile.ZipFile(live.fmu_file(10)) as archive:
         core = archive.read("resources/StrainTire.core")
     (folder / "StrainTire.core").write_bytes(core)
     with zipfile.ZipFile(virtual_host.file(10)) as archive:
-        archive.extract("resources/VirtualTire.core", folder)
-    (folder / "resources" / "VirtualTire.core").rename(folder / "VirtualTire.core")
+        surface = archive.read("resources/VirtualTire.core")
+    (folder / "virtual" / "VirtualTire.core").write_bytes(surface)
     strain = live.strain_of(4e3, 0.1, turns=6.4)[0]
     np.ascontiguousarray(strain.T).tofile(folder / "samples.bin")
     return folder

@@ -32,7 +32,7 @@ NOTES = (
 """Notes by the number of their bit in ``estimates.h``."""
 ROLLING = ("unknown", "free", "braking", "driving")
 """In the order of ``estimates.h``."""
-BLOCK = 32
+BLOCK = 128
 """Turns that the core takes at a time."""
 KEPT = 4
 """Calibrations that are kept as the core has them."""

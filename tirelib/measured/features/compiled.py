@@ -102,10 +102,13 @@ class CompiledRecords:
             at = [place + self._used * size for place, size in places]
             found = record.cut(self._core.cut_features, turn, *at)
             heads = self._heads[self._used : self._used + found]
-            heads["time"] += start
-            heads["ready"] += start
-            contacts.append((heads["time"], heads["omega"]))
+            if start:
+                heads["time"] += start
+                heads["ready"] += start
+            contacts.append((heads["time"].copy(), heads["omega"].copy()))
             self._used += found
+        if len(contacts) == 1:
+            return contacts[0]
         time, omega = (np.concatenate(parts) for parts in zip(*contacts, strict=True))
         return time, omega
 

@@ -12,6 +12,7 @@ from tirelib.core.compiled import (
     Core,
     LowPassStruct,
     TurnStruct,
+    address,
     block_of,
     columns_of,
 )
@@ -41,13 +42,13 @@ class Record:
         held: Held,
         trigger: BoolArray | None,
     ) -> None:
-        self._columns, self._kept = columns_of(strain, dict(held), HELD, trigger)
-        self._positions = np.ascontiguousarray(lateral, dtype=np.float64)
+        self._columns, self._kept = columns_of(strain, held, HELD, trigger)
+        positions = np.ascontiguousarray(lateral, dtype=np.float64)
         self._memory = room
         self._cutter = core.cutter_start(
-            room.ctypes.data,
+            address(room),
             lateral.size,
-            self._positions.ctypes.data,
+            address(positions),
             rate,
             c.byref(low_pass_struct(low_pass)),
         )
