@@ -139,20 +139,19 @@ class Hypotheses:
             return None
 
     def simpler(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """Return the likeliest hypothesis of fewer of its effects that is at least as likely.
+        """Return the likeliest hypothesis of fewer of its effects that explains the runs as well.
 
-        Where there is one that stays with loose laws, a law of its is not right: that more effects
-        cover what it leaves does not show that they are there.
+        Something without a name may stand beside these. Where there is such a hypothesis, that more
+        effects cover what fewer leave does not show that they are there.
         """
-        fewer = (
+        as_good = (
             h
-            for h in self.tried
+            for h in (self.base, *self.tried)
             if h.plausible
-            and np.isfinite(h.looseness)
             and set(h.names) < set(hypothesis.names)
-            and h.likelihood >= hypothesis.likelihood
+            and h.unnamed >= hypothesis.likelihood
         )
-        return max(fewer, key=lambda h: h.likelihood, default=None)
+        return max(as_good, key=lambda h: h.likelihood, default=None)
 
     def added(self, hypothesis: Hypothesis) -> tuple[str, ...]:
         """Return the names of a hypothesis' further effects."""

@@ -52,7 +52,8 @@ class Hypothesis:
     plausible : bool
         Whether the strengths lie in their ranges.
     likelihood : float
-        Largest log likelihood over the families, [nats].
+        Largest log likelihood over the families and over how far the laws are off, laws that are
+        exact among them, [nats].
     rival : str
         Effects of a hypothesis of as many effects that is likelier; empty where there is none.
     p_rival : float
@@ -97,6 +98,14 @@ class Hypothesis:
     def against(self) -> str:
         """What has this score: a further effect, a group of shapes, or the law of an effect."""
         return self.null.names[int(np.argmax(self.null.scores))]
+
+    @property
+    def unnamed(self) -> float:
+        """Largest log likelihood with these effects and something without a name, [nats].
+
+        It is more of a group of smooth shapes than plain tires have.
+        """
+        return max(self.likelihood, *(null.unnamed for null in self.nulls))
 
     @property
     def p(self) -> float:
@@ -168,6 +177,7 @@ def judged(
         near = found[laws][1:]
         found |= {m: _likeliest(near, fit, families, m) for m in more if m not in found}
         laws = max(found, key=lambda laws: found[laws][0])
+    exact, _ = _likeliest(views, fit, families, _each(fit, 0.0))
     loosest = _each(fit, LOOSEST)
     likeliest = sorted(alike, key=lambda laws: -found[laws][0])
     looseness = np.inf
@@ -179,7 +189,8 @@ def judged(
         if stays:
             looseness = max((*each, LAWS[-1])) / LAWS[-1]
             break
-    return Hypothesis(fit, *kept, looseness, plausible(fit, own_effects), found[laws][0])
+    likelihood = max(exact, found[laws][0])
+    return Hypothesis(fit, *kept, looseness, plausible(fit, own_effects), likelihood)
 
 
 def _vague(fit: Posterior) -> list[int]:
@@ -297,14 +308,16 @@ def law_errors(fit: Posterior, laws: Sequence[float], view: View) -> dict[str, f
 
     They come on top of what plain tires show. A law's error has shapes of its own. To some extent
     it looks like each other effect: by the problem's share (`Model.lookalike`) of what the laws do
-    that the base cannot take.
+    that the base cannot take. Exact laws have no error.
     """
+    if not any(laws):
+        return {}
     out: dict[str, float | FloatArray] = {
         ROUGHLY + effect.name: law**2
         for effect, law in zip(fit.effects, laws, strict=True)
         if not effect.exact
     }
-    if out and fit.lookalike:
+    if fit.lookalike:
         square, others = _beyond_base(fit, view)
         out |= {name: fit.lookalike**2 * square / other for name, other in others.items()}
     return out

@@ -133,6 +133,14 @@ class Null:
         return float(self._levels.max())
 
     @property
+    def unnamed(self) -> float:
+        """The likelihood with more of the group of shapes that gains most, [nats]."""
+        gains = 0.5 * self.counts * self._ratios[:, 0]
+        return self.likelihood + max(
+            float(gain) for gain, name in zip(gains, self.names, strict=True) if "," in name
+        )
+
+    @property
     def likeliest(self) -> Weighed:
         """The normal equations at the likeliest sizes."""
         return self._weighed[int(np.argmax(self._levels))][1]

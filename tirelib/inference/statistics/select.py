@@ -129,6 +129,8 @@ def select(
             return done(*_smallest([hypotheses.without_plain(h) for h in members]))
         if staying:
             likeliest = max(filter(None, simpler.values()), key=lambda h: h.likelihood)
+            if likeliest is base:
+                return done("unknown", ())
             return done("form_inadequate", [likeliest])
         leaders = fitted[:LEADERS]
     leader = leaders[0] if leaders else None
