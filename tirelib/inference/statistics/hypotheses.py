@@ -141,15 +141,15 @@ class Hypotheses:
     def simpler(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """Return the likeliest hypothesis of fewer of its effects that explains the runs as well.
 
-        Something without a name may stand beside these. Where there is such a hypothesis, that more
-        effects cover what fewer leave does not show that they are there.
+        Something without a name may stand beside either. Where there is such a hypothesis, that
+        more effects cover what fewer leave does not show that they are there.
         """
         as_good = (
             h
             for h in (self.base, *self.tried)
             if h.plausible
             and set(h.names) < set(hypothesis.names)
-            and h.unnamed >= hypothesis.likelihood
+            and h.unnamed >= hypothesis.unnamed
         )
         return max(as_good, key=lambda h: h.likelihood, default=None)
 

@@ -105,7 +105,8 @@ class Hypothesis:
 
         It is more of a group of smooth shapes than plain tires have.
         """
-        return max(self.likelihood, *(null.unnamed for null in self.nulls))
+        without = max(null.likelihood for null in self.nulls)
+        return self.likelihood + max(null.unnamed for null in self.nulls) - without
 
     @property
     def p(self) -> float:

@@ -135,10 +135,8 @@ class Null:
     @property
     def unnamed(self) -> float:
         """The likelihood with more of the group of shapes that gains most, [nats]."""
-        gains = 0.5 * self.counts * self._ratios[:, 0]
-        return self.likelihood + max(
-            float(gain) for gain, name in zip(gains, self.names, strict=True) if "," in name
-        )
+        gains = zip(self.names, 0.5 * self.counts * self._ratios[:, 0], strict=True)
+        return self.likelihood + max(float(gain) for name, gain in gains if "," in name)
 
     @property
     def likeliest(self) -> Weighed:
