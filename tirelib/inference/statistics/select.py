@@ -139,6 +139,7 @@ def select(
         leader = hypotheses.at((*hypotheses.added(leader), *further), leader) if further else None
     found = many and leader is not None and leader.plausible
     best = leader if found else _with_loose_laws(hypotheses)
+    best = best and hypotheses.without_plain(best)
     if best is not None:
         return done("form_inadequate", [best, *(_alike(hypotheses, best) if many else ())])
     return done("unknown", ())

@@ -229,6 +229,21 @@ def test_a_law_that_is_a_definition_has_no_error() -> None:
     assert named[True] == ()  # it may not be off, and nothing else explains what it leaves
 
 
+def test_an_effect_as_large_as_plain_tires_show_it_is_not_named_where_no_law_is_right(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tested = Hypotheses._tested
+
+    def loose(self: Hypotheses, problem: Any, fit: Posterior) -> Hypothesis:
+        """Return a hypothesis as one that is rejected, a pair only unless its laws are loose."""
+        h = tested(self, problem, fit)
+        return replace(h, p_rival=0.0, looseness=10.0 / 3.0 if len(fit.effects) == 2 else np.inf)
+
+    monkeypatch.setattr(Hypotheses, "_tested", loose)
+    found = select(Toy(drawn(np.random.default_rng(2), bend=0.6)), FAMILIES)
+    assert (found.kind, found.sets) == ("form_inadequate", (("bend",),))
+
+
 @pytest.mark.parametrize(("least", "kind"), [(1, "unknown"), (2, "form_inadequate")])
 def test_more_effects_that_are_not_likelier_do_not_show_that_they_are_there(
     monkeypatch: pytest.MonkeyPatch, least: int, kind: str
