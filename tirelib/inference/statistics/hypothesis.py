@@ -128,7 +128,7 @@ class Hypothesis:
         return p, max(float(np.sqrt(p * (1.0 - p) / count)), 1.0 / (count + 1))
 
     def p_plain(self, index: int) -> float:
-        """Return the p-value of that an effect is as large as plain tires show it.
+        """Return the p-value of the hypothesis that an effect is as large as plain tires show it.
 
         By chi-squared of its strength, whose variance is that of the fit with roughly right laws
         and that of plain tires; the largest over the families.
