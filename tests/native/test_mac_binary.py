@@ -1,4 +1,4 @@
-"""What can be told of the library for Macs without one: its format, its needs, its signature.
+"""What is checked of the library for Macs without a Mac: format, dependencies, signature.
 
 Structures: Apple, ``mach-o/fat.h``, ``mach-o/loader.h``, ``mach-o/nlist.h``, and of the signature
 ``kern/cs_blobs.h``. Numbers of the headers are in the comments.

@@ -235,7 +235,7 @@ def fitted_delay(
 ) -> tuple[float, float]:
     """Return the delay [s] and its standard deviation, by what of it goes with the speed.
 
-    A zero of the wheel angle that is the same in all runs is fitted beside the delay, with no
+    One offset of the wheel angle, the same in all runs, is fitted beside the delay without a
     prior. At one speed the two cannot be told apart, and no delay is reported. Damping of the
     sidewall and sliding shift the strain too, and the delay holds a little of them.
 

@@ -134,9 +134,9 @@ class Null:
 
     @property
     def unnamed(self) -> float:
-        """The likelihood with more of the group of shapes that gains most, [nats]."""
+        """The likelihood with more of the group of shapes that gains most, if any, [nats]."""
         gains = zip(self.names, 0.5 * self.counts * self._ratios[:, 0], strict=True)
-        return self.likelihood + max(float(gain) for name, gain in gains if "," in name)
+        return self.likelihood + max((float(g) for name, g in gains if "," in name), default=0.0)
 
     @property
     def likeliest(self) -> Weighed:

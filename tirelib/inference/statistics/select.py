@@ -7,7 +7,8 @@ off than laws are. Its p-value is the rank of the largest standard score
 plan: for each family of tires by itself; the largest p over the families counts, so that a tire
 that is like any one of them is covered. A hypothesis is rejected as well where a rival of as many
 effects explains the runs much better (`tirelib.inference.statistics.rival`), whether the rival
-itself is rejected or not. Every hypothesis with p > alpha is in the set, without those of its
+itself is rejected or not, and gives way to fewer of its effects that explain the runs as well
+(`Hypotheses.simpler`). Every other hypothesis with p > alpha is in the set, without those of its
 effects that are no larger than plain tires show (`Hypothesis.p_plain`). Its smallest members are
 what the data say (Ferrari and Yang 2015): none in it, nothing is missing; one smallest member, that
 is what is missing; several, they cannot be told apart; none at all, something unknown is there.
