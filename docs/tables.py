@@ -14,7 +14,6 @@ from tirelib.fmu.variables import Variable
 from tirelib.fmu.virtual import table as virtual
 from tirelib.fmu.virtual.spec import friction_surface
 from tirelib.fmu.virtual.surface import shared_surface
-from tirelib.stream.estimator import RATES
 
 ORDER = (
     "strain_to_load",
@@ -115,9 +114,7 @@ def _limits(variable: Variable) -> str:
 
 def strain_variables() -> str:
     """Return the variables of ``StrainTire.fmu`` for one sample a step."""
-    return variables(
-        [*parameters(1e4, RATES), *inputs(LATERAL, 1, buffered=True), *outputs(LATERAL)]
-    )
+    return variables([*parameters(1e4), *inputs(LATERAL, 1, buffered=True), *outputs(LATERAL)])
 
 
 def virtual_variables() -> str:

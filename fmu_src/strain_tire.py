@@ -23,7 +23,6 @@ from tirelib.fmu.wheel import (
     load_wheel,
     read_other,
 )
-from tirelib.stream.estimator import RATES
 
 
 class StrainTire(GuardedSlave, Fmi2Slave):
@@ -37,7 +36,7 @@ class StrainTire(GuardedSlave, Fmi2Slave):
         self._samples = int(self.settings["samples_per_step"])
         self._buffered = bool(self.settings["buffered"])
         lateral = embedded_calibration(self.folder / "calibration.toml").lateral
-        fixed = parameters(self.settings["sample_rate"], RATES, float(self.settings["missing"]))
+        fixed = parameters(self.settings["sample_rate"], float(self.settings["missing"]))
         given = inputs(lateral, self._samples, buffered=self._buffered)
         taken = outputs(lateral)
         self._missing = [v.name for v in fixed].index(MISSING)

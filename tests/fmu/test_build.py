@@ -18,13 +18,13 @@ from tests.fmu import live, virtual_host
 from tests.fmu.player import CONDITIONS
 from tirelib.core.errors import FormatError, ParameterError
 from tirelib.core.flags import TurnFlag
+from tirelib.core.rates import RATES
 from tirelib.core.units import TABLE
 from tirelib.fmu.build import build_fmu, embedded_calibration
 from tirelib.fmu.bundle import collect, content_hash, renamed
 from tirelib.fmu.native import core_file
 from tirelib.fmu.parts import source_file
 from tirelib.fmu.run import LoadedFmu
-from tirelib.stream.estimator import RATES
 
 GIVEN = {
     "1": "ratio",

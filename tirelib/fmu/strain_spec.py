@@ -7,6 +7,7 @@ from typing import Any
 
 from tirelib.core.errors import ParameterError
 from tirelib.core.flags import INVALIDATING, TurnFlag
+from tirelib.core.rates import check_rate
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.core_table import VALUES
 from tirelib.fmu.describe3 import CLOCK, JOINED, joined
@@ -19,7 +20,6 @@ from tirelib.fmu.strain_reference import strain_reference
 from tirelib.fmu.strain_variables import MISSING, inputs, outputs, parameters
 from tirelib.fmu.variables import Variable
 from tirelib.fmu.wheel import check_missing
-from tirelib.stream.estimator import RATES
 
 MODEL = "StrainTire"
 CALIBRATION = "calibration.toml"
@@ -65,15 +65,10 @@ def strain_tire(
             f"samples per step = {samples_per_step}; allowed are 1 .. {MOST_SAMPLES}; a frame must "
             "be shorter than a turn of the wheel"
         )
-    low, high = RATES
-    if not low <= sample_rate <= high:
-        raise ParameterError(
-            f"sample rate = {sample_rate} Hz; allowed are {low:g} .. {high:g} Hz; give the rate of "
-            "the gages"
-        )
+    check_rate(sample_rate)
     check_missing(missing)
     table = [
-        *parameters(sample_rate, RATES, missing),
+        *parameters(sample_rate, missing),
         *inputs(loaded.lateral, samples_per_step, buffered=buffered, road=loaded.chains[-1].road),
         *outputs(loaded.lateral),
     ]

@@ -5,7 +5,7 @@ import math
 from tirelib.core.flags import TurnFlag
 from tirelib.estimators.estimate import QUANTITIES
 from tirelib.estimators.unknowns import Road
-from tirelib.fmu.variables import RIGHT, Variable
+from tirelib.fmu.variables import RIGHT, Variable, sample_rate
 
 NAN = math.nan
 TYPE = {"Fz": "Force", "alpha": "Angle", "kappa": "Ratio", "Fy": "Force"}
@@ -25,23 +25,10 @@ MISSING = "missing"
 """Name of the parameter that sets what Real outputs show where there is no value."""
 
 
-def parameters(
-    sample_rate: float, limits: tuple[float, float], missing: float = NAN
-) -> list[Variable]:
+def parameters(rate: float, missing: float = NAN) -> list[Variable]:
     """Return the parameters, fixed after initialisation."""
     return [
-        Variable(
-            "sample_rate",
-            "Real",
-            "parameter",
-            "sample rate of the gages",
-            sample_rate,
-            "Hz",
-            "kHz",
-            1e4,
-            *limits,
-            type="Frequency",
-        ),
+        sample_rate(rate),
         Variable(
             "filter_order",
             "Real",

@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+from tirelib.core.rates import RATES
+
 RIGHT = 0.5 * math.pi
 
 
@@ -26,3 +28,19 @@ class Variable:
     low: float | None = None
     high: float | None = None
     type: str | None = None
+
+
+def sample_rate(start: float) -> Variable:
+    """Return the parameter of every FMU that takes or gives samples of strain."""
+    return Variable(
+        "sample_rate",
+        "Real",
+        "parameter",
+        "sample rate of the gages",
+        start,
+        "Hz",
+        "kHz",
+        1e4,
+        *RATES,
+        type="Frequency",
+    )

@@ -5,19 +5,18 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, Self, Unpack
 
 from tirelib.core.arrays import BoolArray, FloatArray
-from tirelib.core.errors import FormatError, ParameterError
+from tirelib.core.errors import FormatError
 from tirelib.core.held import Held
+from tirelib.core.rates import check_rate
 from tirelib.estimators.calibration import Calibration
 from tirelib.stream.estimate import TurnEstimate
 
-__all__ = ["RATES", "STANDSTILL", "WATCHDOG_TURNS", "StreamEstimator", "TurnEstimate"]
+__all__ = ["STANDSTILL", "WATCHDOG_TURNS", "StreamEstimator", "TurnEstimate"]
 
 WATCHDOG_TURNS = 2.0
 """Turns after the middle of the last contact at which an estimate ceases to be valid."""
 STANDSTILL = 0.05
 """Turn rate below which a wheel whose rate is measured counts as standing, [rad/s]."""
-RATES = (100.0, 1e5)
-"""Allowed sample rates, [Hz]; an estimator holds 6 to 12 s of samples."""
 
 
 class StreamEstimator(ABC):
@@ -78,12 +77,7 @@ class StreamEstimator(ABC):
         lateral: Sequence[float] | None = None,
         tire: str | None = None,
     ) -> None:
-        low, high = RATES
-        if not low <= rate <= high:
-            raise ParameterError(
-                f"sample rate = {rate} Hz; allowed are {low:g} .. {high:g} Hz; give the rate of "
-                "the gages"
-            )
+        check_rate(rate)
         gages = calibration.lateral if lateral is None else tuple(float(y) for y in lateral)
         name = calibration.tire if tire is None else tire
         calibration.check_layout(name, gages, "stream")

@@ -3,10 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
+from tirelib.core.rates import RATES
 from tirelib.fmu.virtual.faults import Faults, check
-
-RATES = (100.0, 100_000.0)
-"""Sample rates that are allowed [Hz]."""
 
 
 @dataclass(frozen=True, slots=True)

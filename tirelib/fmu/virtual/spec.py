@@ -10,6 +10,7 @@ import numpy as np
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.core.parameters.tire_file import models_folder
+from tirelib.core.rates import check_rate
 from tirelib.fmu.export import export
 from tirelib.fmu.handbook import html_table, page
 from tirelib.fmu.native import pack
@@ -18,7 +19,7 @@ from tirelib.fmu.reference import FOLDER, Reference
 from tirelib.fmu.spec import SlaveSpec
 from tirelib.fmu.virtual.coordinates import FRICTION
 from tirelib.fmu.virtual.core_table import flat_table
-from tirelib.fmu.virtual.options import RATES, Options
+from tirelib.fmu.virtual.options import Options
 from tirelib.fmu.virtual.remarks import lines
 from tirelib.fmu.virtual.surface import Surface, read_surface
 from tirelib.fmu.virtual.table import START, inputs, outputs, parameters
@@ -93,12 +94,7 @@ def virtual_tire(
             f"samples per step = {samples_per_step}; allowed are 1 .. {MOST_SAMPLES}; take a "
             "shorter communication step"
         )
-    low, high = RATES
-    if not low <= sample_rate <= high:
-        raise ParameterError(
-            f"sample rate = {sample_rate} Hz; allowed are {low:g} .. {high:g} Hz; give the rate of "
-            "the gages"
-        )
+    check_rate(sample_rate)
     known = read_surface(Path(surface))
     table = [*parameters(sample_rate), *inputs(known), *outputs(known, samples_per_step)]
     reference = virtual_reference(known, sample_rate, samples_per_step)

@@ -2,8 +2,8 @@
 
 import math
 
-from tirelib.fmu.variables import RIGHT, Variable
-from tirelib.fmu.virtual.options import RATES, Options
+from tirelib.fmu.variables import RIGHT, Variable, sample_rate
+from tirelib.fmu.virtual.options import Options
 from tirelib.fmu.virtual.surface import Surface
 
 NAN = math.nan
@@ -19,22 +19,11 @@ START = {
 """Inputs before a host sets them."""
 
 
-def parameters(sample_rate: float) -> list[Variable]:
+def parameters(rate: float) -> list[Variable]:
     """Return the parameters, fixed after initialisation."""
     usual = Options()
     return [
-        Variable(
-            "sample_rate",
-            "Real",
-            "parameter",
-            "sample rate of the gages",
-            sample_rate,
-            "Hz",
-            "kHz",
-            1e4,
-            *RATES,
-            type="Frequency",
-        ),
+        sample_rate(rate),
         Variable(
             "relaxation_length",
             "Real",
