@@ -52,7 +52,7 @@ TURN_FRAMES = 67
 """Frames that one turn fills exactly: 1072 samples, 9.3 turns a second."""
 BLOCK_TURNS = 40
 READ_FRAMES = 40
-STEP = 256
+SAMPLES_PER_STEP = 256
 """Samples that the FMU takes a step; the estimates are those of any other number."""
 FAST = 50.0
 """The wheel's quartz against the host's, [ppm]."""
@@ -351,7 +351,7 @@ def main() -> None:
     out.mkdir(parents=True, exist_ok=True)
     for old in out.glob("hour-*.mcap"):
         old.unlink()
-    fmu, day = ready_fmu(Steps(console), out, STEP)
+    fmu, day = ready_fmu(Steps(console), out, SAMPLES_PER_STEP)
     result = run(given.hours, given.every, fmu, day, out, console)
     store(result, out)
     draw([Sample(**sample) for sample in result["samples"]], out / "soak.png")

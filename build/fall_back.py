@@ -27,7 +27,7 @@ from tirelib.estimators.train import take
 from tirelib.measured.observations import Observations, observe
 from tirelib.rig.plans import plan
 
-STEP = 250.0
+LOAD_STEP = 250.0
 """Least distance of two loads of a plan, [N]."""
 
 
@@ -54,7 +54,7 @@ def rms(error: FloatArray) -> float:
 def rows(seen: Observations) -> Iterator[list[str]]:
     """Yield load, quantity, and errors in use, of the simple polynomial, and of the rule."""
     regressors = compute_regressors(seen.features, range(5))
-    nominal = np.round(seen.nominal["load"] / STEP) * STEP
+    nominal = np.round(seen.nominal["load"] / LOAD_STEP) * LOAD_STEP
     for level in np.unique(nominal):
         test = nominal == level
         rest = take(seen, ~test)

@@ -38,7 +38,7 @@ from cosim.antilock_brakes import (
 from cosim.antilock_roads import FALLING, ROADS, STARTS_OF_SPLIT, Road, falling
 from cosim.closed_loop import HOLDING, STARTS, YAW, YAW_RATE
 from cosim.closed_loop_command import run_study
-from cosim.closed_loop_sources import STEP, Known, Perfect, Strain
+from cosim.closed_loop_sources import TIME_STEP, Known, Perfect, Strain
 from cosim.today import Sensors, SpeedEstimator
 from cosim.vehicle14.files import make_vehicle
 from cosim.vehicle14.model import SIDE_SLIP, Controls
@@ -131,7 +131,7 @@ def stop(road: Road, brakes: Brakes, *, end_speed: float = END_SPEED) -> StopRun
         If the vehicle is faster still after `LONGEST`.
     """
     estimator, vehicle = SpeedEstimator(pitch=PITCH), make_vehicle()
-    drive = Drive(vehicle, vehicle.at_rest(SPEED), STEP)
+    drive = Drive(vehicle, vehicle.at_rest(SPEED), TIME_STEP)
     torque, log = np.zeros(4), _Log()
     time = way = aside = heading = curve = 0.0
     told = before = speed = SPEED
@@ -148,7 +148,7 @@ def stop(road: Road, brakes: Brakes, *, end_speed: float = END_SPEED) -> StopRun
                 speed - end_speed,
             )
         sensors = Sensors.of(drive.state, motion)
-        told = estimator.step(told, sensors, STEP)
+        told = estimator.step(told, sensors, TIME_STEP)
         felt = dataclasses.replace(motion.wheels, alpha=np.arctan(drive.state[SIDE_SLIP]))
         rims = estimator.wheels(sensors)
         given = Given(time, since, motion.wheels, felt, sensors, told, rims)
@@ -174,7 +174,7 @@ def stop(road: Road, brakes: Brakes, *, end_speed: float = END_SPEED) -> StopRun
         factor = falling(road.friction(way), motion.wheels)
         if since >= 0.0:
             drift = math.atan2(drive.state[11], drive.state[10])
-            aside += speed * math.sin(off + drift) * STEP
+            aside += speed * math.sin(off + drift) * TIME_STEP
             w, known = motion.wheels, getattr(brakes, "known", _NOTHING)
             log.add(
                 (since, way, speed, told, off, aside, angle),
@@ -188,7 +188,7 @@ def stop(road: Road, brakes: Brakes, *, end_speed: float = END_SPEED) -> StopRun
                 known.alpha,
             )
         motion = drive.step(
-            STEP,
+            TIME_STEP,
             Controls(
                 steer=np.array([angle, angle, 0.0, 0.0]),
                 drive=push,
@@ -198,13 +198,13 @@ def stop(road: Road, brakes: Brakes, *, end_speed: float = END_SPEED) -> StopRun
             ),
         )
         before, speed = speed, float(np.hypot(*drive.state[10:12]))
-        way += 0.5 * (before + speed) * STEP * (since >= 0.0)
-        time += STEP
+        way += 0.5 * (before + speed) * TIME_STEP * (since >= 0.0)
+        time += TIME_STEP
     scalars, *tables = log.columns()
     over = (end_speed - speed) / max(before - speed, 1e-12)  # the end lies within the last step
     source = getattr(brakes, "source", None)
     return StopRun(
-        way - over * before * STEP,
+        way - over * before * TIME_STEP,
         *scalars.T,
         *tables,
         refused=int(getattr(source, "refused", 0)),
@@ -266,7 +266,7 @@ def study(
     Parameters
     ----------
     virtual, strain : path
-        The FMUs, for frames of `STEP`.
+        The FMUs, for frames of `TIME_STEP`.
     roads : sequence of Road
     progress : callable, optional
         Called with what was done.

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from cosim.closed_loop_sources import STEP, Known, Perfect, Strain
+from cosim.closed_loop_sources import TIME_STEP, Known, Perfect, Strain
 from cosim.today import Sensors, TodaysBrakes
 from cosim.traction import TractionController
 from cosim.vehicle14.model import Wheels
@@ -80,7 +80,7 @@ class Today:
         """Return what the control cycle asks for."""
         if given.since < 0.0:
             return np.zeros(4)
-        return self._brakes.step(given.rims, given.speed, PEDAL, STEP)
+        return self._brakes.step(given.rims, given.speed, PEDAL, TIME_STEP)
 
     def held(self, torque: FloatArray, actual: FloatArray) -> None:
         """Let the pressures be what the rules of the axles left."""
@@ -128,7 +128,7 @@ class TractionBrakes:
         before, self.omega, self.known = self.omega, omega, known
         if given.since < 0.0 or before is None:
             return np.zeros(4)
-        slowing = (before - omega) / STEP * self.control.radius
+        slowing = (before - omega) / TIME_STEP * self.control.radius
         self.believed, self.wanted = self.control.step(
             self.believed, known, (self.torque, slowing), speed, given.since
         )
@@ -170,5 +170,5 @@ def axle_rules(asked: FloatArray, parted: float | None, reserve: float | None) -
 
 def actuated(torque: FloatArray, wanted: FloatArray) -> FloatArray:
     """Return the torques of the brakes [N m] a step after they were `torque`."""
-    change = (wanted - torque) * STEP / (LAG + STEP)
-    return torque + np.clip(change, -RELEASE * STEP, BUILD * STEP)
+    change = (wanted - torque) * TIME_STEP / (LAG + TIME_STEP)
+    return torque + np.clip(change, -RELEASE * TIME_STEP, BUILD * TIME_STEP)

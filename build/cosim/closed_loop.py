@@ -21,7 +21,7 @@ import numpy as np
 
 from cosim.closed_loop_command import run_study
 from cosim.closed_loop_controller import SlipController
-from cosim.closed_loop_sources import STEP, OncePerTurn, OneTurnLate, Perfect, Source, Strain
+from cosim.closed_loop_sources import TIME_STEP, OncePerTurn, OneTurnLate, Perfect, Source, Strain
 from cosim.vehicle14.files import make_vehicle
 from cosim.vehicle14.model import SPIN, Controls
 from cosim.vehicle14.run import Drive
@@ -158,7 +158,7 @@ def brake(
         )
     control = controller or SlipController()
     vehicle = make_vehicle()
-    drive = Drive(vehicle, vehicle.at_rest(SPEED), STEP)
+    drive = Drive(vehicle, vehicle.at_rest(SPEED), TIME_STEP)
     given = dataclasses.replace(Controls.none(), steer=road.angles(0.0, 0.0))
     motion = drive.look(given)
     source.begin(motion.wheels, drive.state[SPIN])
@@ -178,11 +178,11 @@ def brake(
         if time < road.rolling:
             known = source.step(time, motion.wheels, drive.state[SPIN])
             push = _hold(vehicle.parameters.drag, speed)
-            motion = drive.step(STEP, dataclasses.replace(given, drive=push))
+            motion = drive.step(TIME_STEP, dataclasses.replace(given, drive=push))
             speed, spin = float(np.hypot(*drive.state[10:12])), drive.state[SPIN]
         else:
             since = time - road.rolling
-            slowing = (spin - drive.state[SPIN]) / STEP * control.radius
+            slowing = (spin - drive.state[SPIN]) / TIME_STEP * control.radius
             known = source.step(time, motion.wheels, drive.state[SPIN])
             asked, torque = control.step(asked, known, slowing, speed, since)
             wheels = motion.wheels
@@ -199,17 +199,17 @@ def brake(
             )
             spin = drive.state[SPIN]
             held = dataclasses.replace(given, brake=torque, friction=road.friction(way))
-            motion = drive.step(STEP, held)
+            motion = drive.step(TIME_STEP, held)
             before, speed = speed, float(np.hypot(*drive.state[10:12]))
-            way += 0.5 * (before + speed) * STEP
-        time += STEP
+            way += 0.5 * (before + speed) * TIME_STEP
+        time += TIME_STEP
     scalars, *tables = (np.array(column) for column in zip(*rows, strict=True))
     over = (end_speed - speed) / max(before - speed, 1e-12)  # the end lies within the last step
     delays = getattr(source, "delays", [])
     since_brakes, ways, speeds = scalars.T
     kappa, load, alpha, known_kappa, known_load, torques = tables
     return BrakingRun(
-        distance=way - over * before * STEP,
+        distance=way - over * before * TIME_STEP,
         time=since_brakes,
         way=ways,
         speed=speeds,
@@ -330,7 +330,7 @@ def study(
     Parameters
     ----------
     virtual, strain : path
-        The FMUs, for frames of `STEP`.
+        The FMUs, for frames of `TIME_STEP`.
     roads : sequence of Braking
     starts : sequence of 4 floats each, [rad]
         Wheel angles at time zero of the repetitions.

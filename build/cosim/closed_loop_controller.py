@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.closed_loop_sources import STEP, Known
+from cosim.closed_loop_sources import TIME_STEP, Known
 from tirelib.core.arrays import FloatArray
 
 
@@ -78,7 +78,7 @@ class SlipController:
         moving = limit > asked  # the integral waits for the brakes to rise
         change = self.integral * speed * error * moving - self.yield_ * excess
         change -= self.release * (~known.sure & np.isfinite(known.kappa))
-        asked = np.minimum(np.maximum(asked + change * STEP, 0.05), self.most)
+        asked = np.minimum(np.maximum(asked + change * TIME_STEP, 0.05), self.most)
         wanted = np.minimum(asked + self.proportional * error, limit)
         torque = self.radius * known.load * np.maximum(wanted, 0.0)
         return asked, np.where(np.isnan(torque), 0.0, torque)

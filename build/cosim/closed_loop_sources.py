@@ -16,7 +16,7 @@ from cosim.vehicle14.model import Wheels
 from cosim.wheels import OWN_FRICTION, FourWheels, WheelStates
 from tirelib.core.arrays import BoolArray, FloatArray
 
-STEP = 2e-3
+TIME_STEP = 2e-3
 """Communication step, and that of the controller [s]."""
 READY = math.radians(35.0)
 """Wheel angle after the middle of the contact at which an estimate is ready."""
@@ -75,7 +75,7 @@ class OncePerTurn:
     def step(self, time: float, wheels: Wheels, omega: FloatArray) -> Known:
         """Turn the wheels, look at the truth over the road, tell it later."""
         before = self._angle
-        self._angle = before + omega * STEP
+        self._angle = before + omega * TIME_STEP
         now = np.array((wheels.kappa, wheels.Fz, wheels.alpha))
         self._seen = np.where(_passes(before, self._angle, 0.0), now, self._seen)
         self._told = np.where(_passes(before, self._angle, READY), self._seen, self._told)
@@ -100,7 +100,7 @@ class OneTurnLate:
 
     def step(self, time: float, wheels: Wheels, omega: FloatArray) -> Known:
         """Return what was true when the wheels stood a turn earlier."""
-        self._angle = self._angle + omega * STEP
+        self._angle = self._angle + omega * TIME_STEP
         self._past.append((self._angle, Known(wheels.kappa, wheels.Fz, wheels.alpha)))
         while len(self._past) > 1 and np.all(self._past[1][0] <= self._angle - 2.0 * np.pi):
             self._past.popleft()
@@ -134,10 +134,10 @@ class Strain:
         states = _states(wheels, omega)
         if math.isfinite(told_speed):
             states = replace(states, told_speed=np.full(4, told_speed))
-        told = self._four.step(time, STEP, states)
+        told = self._four.step(time, TIME_STEP, states)
         self.out_of_range += int((~told.tire_valid).sum())
         new = told.turn != self._turn
-        self.delays += (time + STEP - told.contact_time[new & told.valid]).tolist()
+        self.delays += (time + TIME_STEP - told.contact_time[new & told.valid]).tolist()
         self._turn = told.turn
         self.refused += int((new & ~told.valid).sum())
         self._known = Known(

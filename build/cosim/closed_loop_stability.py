@@ -22,7 +22,15 @@ import numpy as np
 
 from cosim.closed_loop import STARTS, YAW_RATE
 from cosim.closed_loop_command import run_study
-from cosim.closed_loop_sources import STEP, Known, OncePerTurn, OneTurnLate, Perfect, Source, Strain
+from cosim.closed_loop_sources import (
+    TIME_STEP,
+    Known,
+    OncePerTurn,
+    OneTurnLate,
+    Perfect,
+    Source,
+    Strain,
+)
 from cosim.vehicle14.files import make_vehicle
 from cosim.vehicle14.model import SPIN, Controls
 from cosim.vehicle14.run import Drive
@@ -162,7 +170,7 @@ def swerve(
     """Drive the manoeuvre; without a source nobody brakes."""
     road, control = road or Swerve(), controller or StabilityController()
     vehicle = make_vehicle()
-    drive = Drive(vehicle, vehicle.at_rest(road.speed), STEP)
+    drive = Drive(vehicle, vehicle.at_rest(road.speed), TIME_STEP)
     rear = road.rear_friction
     given = dataclasses.replace(Controls.none(), friction=np.array([1.0, 1.0, rear, rear]))
     motion = drive.look(given)
@@ -170,8 +178,8 @@ def swerve(
         source.begin(motion.wheels, drive.state[SPIN])
     rows: list[tuple[FloatArray, ...]] = []
     unknown = Known(*np.full((3, 4), np.nan))
-    for number in range(round(road.lasts / STEP)):
-        time, wheels = number * STEP, motion.wheels
+    for number in range(round(road.lasts / TIME_STEP)):
+        time, wheels = number * TIME_STEP, motion.wheels
         known = source.step(time, wheels, drive.state[SPIN]) if source is not None else unknown
         torque, angle = control.torque(known), road.steer(time)
         x = drive.state
@@ -184,7 +192,7 @@ def swerve(
         )
         rows.append((np.array(scalars), wheels.alpha, wheels.kappa, known.alpha, torque))
         steer = np.array([angle, angle, 0.0, 0.0])
-        motion = drive.step(STEP, dataclasses.replace(given, steer=steer, brake=torque))
+        motion = drive.step(TIME_STEP, dataclasses.replace(given, steer=steer, brake=torque))
     table, alpha, kappa, told, torques = (np.array(x) for x in zip(*rows, strict=True))
     return SwerveRun(
         *table.T,
@@ -221,7 +229,7 @@ def stability(
     Parameters
     ----------
     virtual, strain : path
-        The FMUs, for frames of `STEP`.
+        The FMUs, for frames of `TIME_STEP`.
     road : Swerve, optional
     starts : sequence of 4 floats each, [rad]
         Wheel angles at time zero of the repetitions.

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.recording import STEP, follow
+from cosim.recording import TIME_STEP, follow
 from cosim.wheels import WHEELS, FourWheels, WheelStates
 
 CASES: tuple[tuple[str, str, float], ...] = (
@@ -46,13 +46,13 @@ def drill(wheels: FourWheels) -> list[dict[str, Any]]:
             changed = getattr(out, name).copy()
             changed[at] = value
             out = replace(out, **{name: changed})
-        before = round(BEFORE / STEP)
-        told = follow([steady] * before + [out] * round(AFTER / STEP), wheels)
+        before = round(BEFORE / TIME_STEP)
+        told = follow([steady] * before + [out] * round(AFTER / TIME_STEP), wheels)
         for at, (words, _, _) in enumerate(cases):
             valid = told["valid"][:, at] > 0.0
             dropped = np.flatnonzero(~valid[before:])
             omega = told["tire_omega"][before - 1, at]
-            turns = dropped[0] * STEP * omega / (2.0 * np.pi) if dropped.size else np.nan
+            turns = dropped[0] * TIME_STEP * omega / (2.0 * np.pi) if dropped.size else np.nan
             found.append(
                 {
                     "case": words,

@@ -28,7 +28,7 @@ import numpy as np
 from cosim.antilock import AT_ONCE
 from cosim.closed_loop import STARTS
 from cosim.closed_loop_command import run_study
-from cosim.closed_loop_sources import STEP
+from cosim.closed_loop_sources import TIME_STEP
 from cosim.vehicle14.files import make_vehicle
 from cosim.vehicle14.model import SPIN, Controls
 from cosim.vehicle14.parameters import GRAVITY, VehicleParameters
@@ -109,7 +109,7 @@ def approach(kind: str, four: FourWheels | None = None) -> Approach:
     """Drive up to `PLACE`; `four` are the wheels of "strain"."""
     vehicle = make_vehicle()
     p = vehicle.parameters
-    drive = Drive(vehicle, vehicle.at_rest(SPEED), STEP)
+    drive = Drive(vehicle, vehicle.at_rest(SPEED), TIME_STEP)
     motion = drive.look(Controls.none())
     weight = p.mass * GRAVITY
     if four is not None:
@@ -126,15 +126,15 @@ def approach(kind: str, four: FourWheels | None = None) -> Approach:
         known = {"perfect": share, "today": 0.0}.get(kind, 0.0)
         if four is not None:
             known = suspected(
-                four.step(time, STEP, _states(wheels, drive.state[SPIN], wedge, factor))
+                four.step(time, TIME_STEP, _states(wheels, drive.state[SPIN], wedge, factor))
             )
         brakes = known > (0.9 * ALLOWED if brakes else ALLOWED)
         rows.append((time, way, speed, share, known))
-        asked += (GENTLE * brakes - asked) * min(STEP / 0.1, 1.0)
+        asked += (GENTLE * brakes - asked) * min(TIME_STEP / 0.1, 1.0)
         force = p.mass * asked * 0.31
         hold = p.drag * speed**2 * 0.31 * (not brakes)
         motion = drive.step(
-            STEP,
+            TIME_STEP,
             dataclasses.replace(
                 Controls.none(),
                 friction=factor,
@@ -143,8 +143,8 @@ def approach(kind: str, four: FourWheels | None = None) -> Approach:
             ),
         )
         before, speed = speed, float(np.hypot(*drive.state[10:12]))
-        way += 0.5 * (before + speed) * STEP
-        time += STEP
+        way += 0.5 * (before + speed) * TIME_STEP
+        time += TIME_STEP
     return Approach(*np.array(rows).T, weight)
 
 

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from cosim.calibrate import CALIBRATION
 from cosim.manoeuvres import MANOEUVRES
-from cosim.recording import RATE, STEP, drive, follow
+from cosim.recording import RATE, TIME_STEP, drive, follow
 from cosim.wheels import FourWheels
 from tirelib.core.threads import one_thread
 from tirelib.fmu.build import build_fmu
@@ -31,13 +31,13 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--seconds", type=float, default=3.0)
     given = options.parse_args()
-    steps, samples = round(given.seconds / STEP), round(STEP * RATE)
+    steps, samples = round(given.seconds / TIME_STEP), round(TIME_STEP * RATE)
     begin = time.process_time()
     course = [
         m.wheels for m, _ in zip(drive(next(iter(MANOEUVRES.values()))), range(steps), strict=False)
     ]
     spent = (time.process_time() - begin) / len(course)
-    sys.stdout.write(f"vehicle: {1e6 * spent:.0f} us a step of {1e3 * STEP:g} ms\n")
+    sys.stdout.write(f"vehicle: {1e6 * spent:.0f} us a step of {1e3 * TIME_STEP:g} ms\n")
     told = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

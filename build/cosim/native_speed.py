@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from cosim import closed_loop
 from cosim.calibrate import CALIBRATION
 from cosim.manoeuvres import MANOEUVRES
-from cosim.recording import STEP, build_fmus
+from cosim.recording import TIME_STEP, build_fmus
 from cosim.run import DRILL, LOOPS, work
 from tirelib.core.threads import one_thread
 
@@ -78,7 +78,7 @@ def main() -> None:
         options.error(f"{', '.join(unknown)}: allowed are {', '.join(parts)}")
     with tempfile.TemporaryDirectory() as folder:
         for part in given.parts or parts:
-            step = closed_loop.STEP if part in LOOPS else STEP
+            step = closed_loop.TIME_STEP if part in LOOPS else TIME_STEP
             found, spent = {}, {}
             for python in (False, True):
                 place = Path(folder) / f"{step}{python}"

@@ -14,7 +14,7 @@ from tirelib.fmu.build import build_fmu
 from tirelib.fmu.virtual.coordinates import FRICTION, INPUTS
 from tirelib.fmu.virtual.spec import build_virtual, friction_surface
 
-STEP = 1e-3
+TIME_STEP = 1e-3
 """Communication step [s]."""
 RATE = 1e4
 """Sample rate of the gages [Hz]."""
@@ -55,7 +55,7 @@ class Recording:
 
 
 def build_fmus(
-    folder: Path, calibration: Path, step: float = STEP, *, python: bool = False
+    folder: Path, calibration: Path, step: float = TIME_STEP, *, python: bool = False
 ) -> tuple[Path, Path]:
     """Write both FMUs for steps [s], compiled or Python's; return virtual and strain tire."""
     samples = round(step * RATE)
@@ -83,8 +83,8 @@ def drive(manoeuvre: Manoeuvre, number: int = VEHICLE) -> Iterator[Motion]:
     vehicle = Vehicle(number, manoeuvre.speed)
     driver = manoeuvre.driver(vehicle)
     motion = vehicle.look()
-    for _ in range(round(manoeuvre.duration / STEP)):
-        motion = vehicle.step(STEP, driver(vehicle.time, motion))
+    for _ in range(round(manoeuvre.duration / TIME_STEP)):
+        motion = vehicle.step(TIME_STEP, driver(vehicle.time, motion))
         yield motion
 
 
@@ -95,7 +95,7 @@ def record(manoeuvre: Manoeuvre, wheels: FourWheels, number: int = VEHICLE) -> R
     truth = np.array([motion.wheels.rows() for motion in motions])
     return Recording(
         name=manoeuvre.name,
-        time=STEP * np.arange(1.0, len(motions) + 1.0, dtype=np.float64),
+        time=TIME_STEP * np.arange(1.0, len(motions) + 1.0, dtype=np.float64),
         truth={name: truth[:, :, at] for at, name in enumerate(STATES)},
         told=told,
         motion={name: np.array([getattr(m, name) for m in motions]) for name in MOTION},
@@ -109,7 +109,7 @@ def follow(states: list[WheelStates], wheels: FourWheels) -> dict[str, FloatArra
     told = {name: np.empty((len(states), len(WHEELS))) for name in NAMES}
     wheels.start(states[0])
     for row, state in enumerate(states):
-        now = wheels.step(row * STEP, STEP, state)
+        now = wheels.step(row * TIME_STEP, TIME_STEP, state)
         for name, values in told.items():
             values[row] = getattr(now, name)
     return told

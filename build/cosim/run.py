@@ -38,7 +38,7 @@ from cosim import closed_loop_stability_report as stability_report
 from cosim.calibrate import CALIBRATION
 from cosim.drill import drill
 from cosim.manoeuvres import MANOEUVRES
-from cosim.recording import STEP, VEHICLE, Recording, build_fmus, record
+from cosim.recording import TIME_STEP, VEHICLE, Recording, build_fmus, record
 from cosim.score import COVERED, LIMITS, score, turns_of
 from cosim.wheels import WHEELS, FourWheels
 from tirelib.cli.progress import progress_bar
@@ -199,7 +199,7 @@ def main() -> None:
         if (every and (given.all or name != LONG)) or name in given.manoeuvres
     ]
     if loops:
-        slow = build_fmus(given.out / "closed_loop", given.calibration, closed_loop.STEP)
+        slow = build_fmus(given.out / "closed_loop", given.calibration, closed_loop.TIME_STEP)
         parts |= dict.fromkeys(loops, slow)
     found = run(parts, given.jobs)
     scores, checks = [found[name][0] for name in names], found[DRILL]
@@ -217,7 +217,7 @@ def main() -> None:
         "date": datetime.now(UTC).date().isoformat(),
         "vehicle": f"CommonRoad multi-body, parameter set {VEHICLE}",
         "loop_vehicle": "14 degrees of freedom",
-        "step_s": STEP,
+        "step_s": TIME_STEP,
         "calibration": given.calibration.name,
         "limits": dict(LIMITS),
         "missed": missed,

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.recording import STATES, STEP, Recording
+from cosim.recording import STATES, TIME_STEP, Recording
 from cosim.wheels import OWN_FRICTION, WHEELS
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.fmu.virtual.coordinates import FRICTION, half_angle
@@ -99,9 +99,9 @@ def turns_of(recording: Recording, wheel: int) -> Turns:
     contact = told["contact_time"][rows]
     known = np.flatnonzero(told["turn"][rows] > 1)
     rows, contact = rows[known], contact[known]
-    at = np.clip((contact / STEP).astype(np.int64), 0, recording.time.size - 1)
+    at = np.clip((contact / TIME_STEP).astype(np.int64), 0, recording.time.size - 1)
     period = 2.0 * np.pi / told["tire_omega"][at]
-    first = np.maximum(((contact - period) / STEP).astype(np.int64), 0)
+    first = np.maximum(((contact - period) / TIME_STEP).astype(np.int64), 0)
     steady = np.ones(rows.size, dtype=np.bool_)
     for name, limit in STEADY.items():
         size = limit * (recording.static[wheel] if name == "Fz" else 1.0)
@@ -124,7 +124,7 @@ def turns_of(recording: Recording, wheel: int) -> Turns:
         valid={name: told[f"{name}_valid"][rows] > 0.0 for name in LIMITS},
         steady=steady,
         lag=_lag(recording, wheel, at, rows),
-        allowed=AFTER + FILTER + told["tire_omega"][rows] * STEP,
+        allowed=AFTER + FILTER + told["tire_omega"][rows] * TIME_STEP,
     )
 
 
@@ -215,7 +215,7 @@ def _figures(turns: list[Turns], off: list[dict[str, FloatArray]]) -> dict[str, 
     every = {name: np.concatenate([o[name] for o in off]) for name in LIMITS}
     lag = np.concatenate([t.lag for t in turns])
     over = lag - np.concatenate([t.allowed for t in turns])
-    age = np.concatenate([STEP * (t.row + 1) - t.contact for t in turns])
+    age = np.concatenate([TIME_STEP * (t.row + 1) - t.contact for t in turns])
     found: dict[str, Any] = {"turns": int(steady.size)}
     for part, rows in (("steady", steady), ("transient", ~steady)):
         found[part] = {"turns": int(rows.sum())} | {
@@ -253,8 +253,8 @@ def _validity(recording: Recording, wheels: list[int]) -> dict[str, Any]:
     return {
         "false_alarms": alarm / inside if inside else 0.0,
         "gage_out": reduced / inside if inside else 0.0,
-        "out_of_range_s": STEP * outside,
-        "missed_s": STEP * missed,
+        "out_of_range_s": TIME_STEP * outside,
+        "missed_s": TIME_STEP * missed,
     }
 
 
@@ -271,7 +271,7 @@ def in_range(recording: Recording, wheel: int) -> tuple[BoolArray, BoolArray]:
         inside &= (x >= low) & (x <= high)
         outside |= (x < low - slack) | (x > high + slack)
     omega = recording.told["tire_omega"][:, wheel]
-    back = np.ceil(4.0 * np.pi / np.maximum(omega, 1.0) / STEP).astype(np.int64)
+    back = np.ceil(4.0 * np.pi / np.maximum(omega, 1.0) / TIME_STEP).astype(np.int64)
     return _lasting(inside, back), _lasting(outside, back)
 
 
@@ -282,7 +282,7 @@ def _lasting(flag: BoolArray, rows: IntArray) -> BoolArray:
     return np.asarray(number - last_false >= rows, dtype=np.bool_)
 
 
-DELAYS = np.arange(0.0, 0.2, STEP)
+DELAYS = np.arange(0.0, 0.2, TIME_STEP)
 STANDS_OUT = 0.8
 """A delay counts that brings the error below this share of that without delay."""
 
@@ -306,7 +306,7 @@ def _held(recording: Recording, peak: float) -> dict[str, Any]:
             found["delay_ms"][name] = np.nan
             continue
         shifted = []
-        for rows in np.round(DELAYS / STEP).astype(int):
+        for rows in np.round(DELAYS / TIME_STEP).astype(int):
             late = recording.told[name][rows:] - truth[name][: truth[name].shape[0] - rows]
             shifted.append(_rms((np.where(valid[rows:], late, np.nan) * factor).ravel()))
         best = int(np.nanargmin(shifted))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.closed_loop_sources import STEP, Known
+from cosim.closed_loop_sources import TIME_STEP, Known
 from tirelib.core.arrays import FloatArray
 
 
@@ -88,7 +88,7 @@ class TractionController:
         sliding = known.kappa < 1.5 * target
         gives = np.maximum(force / known.load, 0.05)
         change = self.integral * speed * error + self.rise * (known.kappa > 0.5 * target)
-        grown = np.minimum(np.maximum(believed + change * STEP, 0.05), self.most)
+        grown = np.minimum(np.maximum(believed + change * TIME_STEP, 0.05), self.most)
         found = np.where(sliding, np.minimum(grown, gives), grown)
         limit = self.apply * since
         found = np.where(limit > found, found, believed)  # waits for the brakes to rise

@@ -24,7 +24,7 @@ PRESSURES = (1.7e5, 2.1e5, 2.5e5)
 CREEP = 0.5
 """Speed of the press: slow rolling, [m/s]."""
 SHIFT, TURN = 1e-4, 3e-4
-STEP = 5e3
+PRESSURE_STEP = 5e3
 """Change of pressure for slopes, [Pa]."""
 
 
@@ -47,15 +47,15 @@ class Laboratory:
 def laboratory(tire: RigTire, pressure: float) -> Laboratory:
     """Do all tests but the press at a pressure [Pa]."""
     k_u, k_v = sidewall_test(tire, pressure)
-    above = sidewall_test(tire, pressure + STEP)
-    below = sidewall_test(tire, pressure - STEP)
+    above = sidewall_test(tire, pressure + PRESSURE_STEP)
+    below = sidewall_test(tire, pressure - PRESSURE_STEP)
     modal = modal_test(tire, pressure)
     values = {
         "bending_stiffness": modal["bending_stiffness"],
         "radial_stiffness": k_u,
-        "radial_pressure_slope": (above[0] - below[0]) / (2.0 * STEP),
+        "radial_pressure_slope": (above[0] - below[0]) / (2.0 * PRESSURE_STEP),
         "tangential_stiffness": k_v,
-        "tangential_pressure_slope": (above[1] - below[1]) / (2.0 * STEP),
+        "tangential_pressure_slope": (above[1] - below[1]) / (2.0 * PRESSURE_STEP),
         "tread_stiffness": tread_test(tire, pressure),
         "innerliner_offset": tire.innerliner_offset,  # a cut section
         "extension_stiffness": growth_test(tire, pressure),
@@ -200,8 +200,11 @@ def tread_test(tire: RigTire, pressure: float) -> float:
 
 def growth_test(tire: RigTire, pressure: float) -> float:
     """Return EA from the growth of the free belt with pressure: p b R / EA of its radius."""
-    low, high = inflated(tire, pressure - STEP, 0.0), inflated(tire, pressure + STEP, 0.0)
-    pull = 2.0 * STEP * tire.belt_width
+    low, high = (
+        inflated(tire, pressure - PRESSURE_STEP, 0.0),
+        inflated(tire, pressure + PRESSURE_STEP, 0.0),
+    )
+    pull = 2.0 * PRESSURE_STEP * tire.belt_width
     return tire.ring_radius**2 * pull / (high - low)
 
 

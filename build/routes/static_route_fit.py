@@ -15,7 +15,7 @@ WIDEST = 0.3
 """Relative half-width of a 95 % interval up to which a number is called identifiable."""
 LEVEL = 3.84
 """Rise of the cost (in variances) at the ends of a 95 % interval."""
-STEP = 1e-5
+PARAMETER_STEP = 1e-5
 """Step of difference quotients, in coordinates."""
 UNEVEN = 0.3
 """Departure of a profile from the parabola, relative, from which it is called not quadratic."""
@@ -336,7 +336,7 @@ def _slopes(
     base = residual(x)
     out = np.empty((base.size, x.size))
     for k in range(x.size):
-        step = STEP if x[k] + STEP <= high[k] else -STEP
+        step = PARAMETER_STEP if x[k] + PARAMETER_STEP <= high[k] else -PARAMETER_STEP
         moved = x.copy()
         moved[k] += step
         out[:, k] = (residual(moved) - base) / step

@@ -42,7 +42,7 @@ NUMBERS: Mapping[str, str] = {
 }
 """Names of `Family.numbers`, and of the base."""
 STIFFNESS = "vertical stiffness"
-NEAR = 0.03
+STIFFNESS_TOLERANCE = 0.03
 """Relative error up to which a vertical stiffness, which has no interval, counts as held."""
 NUDGE = 1e-3
 """Relative load by which the vertical stiffness is taken."""
@@ -104,7 +104,7 @@ def row(case: Case, without: Sequence[str], prior: Mapping[str, float]) -> Row:
             "not_identifiable" in e.flags,
         )
     wrong = _stiffness(fit, runs, case)
-    numbers[STIFFNESS] = Found(wrong, abs(wrong) <= NEAR)
+    numbers[STIFFNESS] = Found(wrong, abs(wrong) <= STIFFNESS_TOLERANCE)
     error = error_of(runs, TireModel.fitted(fit.values, (), ())).value
     return Row(case.seed, error, numbers)
 

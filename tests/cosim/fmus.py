@@ -10,7 +10,7 @@ from tests.once import once
 from tirelib.fmu.build import build_fmu
 from tirelib.fmu.virtual.spec import build_virtual, friction_surface
 
-SAMPLES, STEP = 20, 2e-3
+SAMPLES, TIME_STEP = 20, 2e-3
 
 
 @cache

@@ -19,7 +19,7 @@ from cosim.antilock_brakes import (
     axle_rules,
 )
 from cosim.antilock_roads import CHANGE, FALLING, ROADS, falling
-from cosim.closed_loop_sources import STEP, Known, Perfect
+from cosim.closed_loop_sources import TIME_STEP, Known, Perfect
 from cosim.hydroplaning import Approach
 from cosim.today import AntiLock, Phase, Sensors, SpeedEstimator, TodaysBrakes
 from cosim.traction import TractionController
@@ -95,12 +95,12 @@ def test_the_control_cycle_goes_as_the_handbook_says(
 def test_todays_brakes_build_release_and_keep_to_the_pedal() -> None:
     brakes, rolls = TodaysBrakes(), np.full(4, 20.0)
     for _ in range(1000):
-        torque = brakes.step(rolls, 20.0, PEDAL, STEP)
+        torque = brakes.step(rolls, 20.0, PEDAL, TIME_STEP)
     np.testing.assert_allclose(torque, PEDAL)
     locks = np.array([20.0, 20.0, 20.0, 20.0])
     for _ in range(60):  # the front left wheel slows by 100 m/s^2
         locks = locks - np.array([0.2, 0.0, 0.0, 0.0])
-        torque = brakes.step(locks, 20.0, PEDAL, STEP)
+        torque = brakes.step(locks, 20.0, PEDAL, TIME_STEP)
     assert torque[0] < 0.5 * PEDAL[0]
     np.testing.assert_allclose(torque[1:], PEDAL[1:])
 
@@ -118,7 +118,7 @@ def test_who_knows_no_slip_angle_brakes_the_rear_axle_by_its_worse_wheel() -> No
 
 def test_actuators_have_a_lag_and_largest_rates() -> None:
     torque = actuated(np.array([0.0, 1000.0, 500.0, 0.0]), np.array([2000.0, 0.0, 501.2, 0.0]))
-    expected = [BUILD * STEP, 1000.0 - RELEASE * STEP, 500.2, 0.0]
+    expected = [BUILD * TIME_STEP, 1000.0 - RELEASE * TIME_STEP, 500.2, 0.0]
     np.testing.assert_allclose(torque, expected)
 
 

@@ -11,7 +11,15 @@ import pytest
 from cosim import closed_loop, closed_loop_report
 from cosim.closed_loop import Study
 from cosim.closed_loop_controller import SlipController
-from cosim.closed_loop_sources import READY, STEP, Known, OncePerTurn, OneTurnLate, Perfect, Strain
+from cosim.closed_loop_sources import (
+    READY,
+    TIME_STEP,
+    Known,
+    OncePerTurn,
+    OneTurnLate,
+    Perfect,
+    Strain,
+)
 from cosim.wheels import FourWheels
 from scipy.integrate import cumulative_trapezoid
 
@@ -24,9 +32,9 @@ CONTROL = SlipController()
 
 def play(source: Any, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Slip ratio as it is and as it is told, shape (n, 4): it falls by 1 a second."""
-    true = -STEP * np.arange(n)[:, None] * np.ones(4)
+    true = -TIME_STEP * np.arange(n)[:, None] * np.ones(4)
     told = [
-        source.step(k * STEP, SimpleNamespace(kappa=row, Fz=1e3 - row, alpha=row), OMEGA).kappa
+        source.step(k * TIME_STEP, SimpleNamespace(kappa=row, Fz=1e3 - row, alpha=row), OMEGA).kappa
         for k, row in enumerate(true)
     ]
     return true, np.array(told)
@@ -38,18 +46,20 @@ def test_once_per_turn_tells_what_was_true_over_the_road_and_only_later() -> Non
     for wheel, (start, omega) in enumerate(zip(starts, OMEGA, strict=True)):
         known = np.isfinite(told[:, wheel])
         # first the contact, then the rest of the way to where it is ready; one step of rounding
-        assert np.argmax(known) * STEP == pytest.approx((READY - start) / omega, abs=1.01 * STEP)
-        assert told[known, wheel][0] == pytest.approx(start / omega, abs=1.01 * STEP)
+        assert np.argmax(known) * TIME_STEP == pytest.approx(
+            (READY - start) / omega, abs=1.01 * TIME_STEP
+        )
+        assert told[known, wheel][0] == pytest.approx(start / omega, abs=1.01 * TIME_STEP)
         changes = np.flatnonzero(np.diff(told[known, wheel]))
-        turns = np.diff(changes) * STEP
-        assert turns == pytest.approx(np.full(turns.size, 2 * np.pi / omega), abs=1.01 * STEP)
+        turns = np.diff(changes) * TIME_STEP
+        assert turns == pytest.approx(np.full(turns.size, 2 * np.pi / omega), abs=1.01 * TIME_STEP)
 
 
 def test_one_turn_late_tells_what_was_true_a_turn_ago() -> None:
     true, told = play(OneTurnLate(), 200)
     turn = 2.0 * np.pi / OMEGA.min()  # the deque waits for the slowest wheel
     late = true[-1, 0] - told[-1, 0]
-    assert -late == pytest.approx(turn, abs=2 * STEP)
+    assert -late == pytest.approx(turn, abs=2 * TIME_STEP)
 
 
 def known(kappa: float, load: float = 4e3, alpha: float = 0.0) -> Known:
@@ -84,7 +94,7 @@ def test_a_wheel_whose_slip_is_not_known_any_more_gives_up_traction() -> None:
     for error in (0.0, 0.05, -0.05):
         lost = dataclasses.replace(known(CONTROL.target + error), sure=np.arange(4) > 0)
         asked, torque = CONTROL.step(np.full(4, 0.8), lost, np.full(4, 8.0), 20.0, 1.0)
-        assert asked[0] == pytest.approx(0.8 - CONTROL.release * STEP)
+        assert asked[0] == pytest.approx(0.8 - CONTROL.release * TIME_STEP)
         assert torque[0] == pytest.approx(asked[0] * 4e3 * CONTROL.radius)
         assert asked[1] == step(known(CONTROL.target + error))[0]
     never = dataclasses.replace(known(math.nan), sure=np.zeros(4, dtype=np.bool_))

@@ -45,7 +45,7 @@ def archive() -> Path:
 
 @cache
 def truth() -> ssp_run.Result:
-    return ssp_run.run_fmpy(archive(), fmus.STEP, STEPS, WATCHED)
+    return ssp_run.run_fmpy(archive(), fmus.TIME_STEP, STEPS, WATCHED)
 
 
 def compare(found: ssp_run.Result, apart: float) -> None:
@@ -66,8 +66,8 @@ def test_the_command_of_ecos_in_an_empty_environment(tmp_path: Path) -> None:
     command = tmp_path / "ecos"
     shutil.copy(Path(spec.origin).parent / "binaries" / "ecos", command)
     command.chmod(0o755)  # that of the wheel lacks the bit
-    stop = str(fmus.STEP * (STEPS + 0.5))
-    options = ["--stepSize", str(fmus.STEP), "--stopTime", stop, "--parameterSet", ssp.SET]
+    stop = str(fmus.TIME_STEP * (STEPS + 0.5))
+    options = ["--stepSize", str(fmus.TIME_STEP), "--stopTime", stop, "--parameterSet", ssp.SET]
     done = subprocess.run(
         [command, "simulate", "--path", archive(), *options],
         cwd=tmp_path,
@@ -94,7 +94,7 @@ def test_one_fmu_of_all(tmp_path: Path, *, threads: bool) -> None:
     components = system().components
     told = {
         "name": "tires.fmu",
-        "step_size": fmus.STEP,
+        "step_size": fmus.TIME_STEP,
         "mt": threads,
         "auto_link": False,  # it would also join estimates to the tires' inputs of the same name
         "auto_input": False,
@@ -121,9 +121,9 @@ def test_one_fmu_of_all(tmp_path: Path, *, threads: bool) -> None:
     subprocess.run([*command, "-container", "tires.json"], cwd=tmp_path, check=True, timeout=600)
     seen = simulate_fmu(
         str(tmp_path / "tires.fmu"),
-        stop_time=STEPS * fmus.STEP,
-        step_size=fmus.STEP,
-        output_interval=fmus.STEP,
+        stop_time=STEPS * fmus.TIME_STEP,
+        step_size=fmus.TIME_STEP,
+        output_interval=fmus.TIME_STEP,
         output=WATCHED,
     )
     compare({name: seen[name][1:] for name in WATCHED}, 0.0)

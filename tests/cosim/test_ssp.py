@@ -35,7 +35,7 @@ def archive() -> Path:
 
 @cache
 def truth() -> ssp_run.Result:
-    return ssp_run.run_fmpy(archive(), fmus.STEP, STEPS)
+    return ssp_run.run_fmpy(archive(), fmus.TIME_STEP, STEPS)
 
 
 def test_the_archive_is_valid_by_its_schemas_and_has_a_parameter_set_per_component() -> None:
@@ -84,7 +84,7 @@ def test_estimates_follow_the_wheels_and_the_parameter_sets_are_used() -> None:
     assert last["vehicle.yaw_rate"] > 0.05  # and it steers
     first = [float(truth()[f"tire_{w}.wheel_angle"][0]) for w in WHEELS]
     omega = ssp.TURN_BRAKING["start_speed"] / 0.308
-    expected = np.array(ssp.START_ANGLES) + omega * fmus.STEP
+    expected = np.array(ssp.START_ANGLES) + omega * fmus.TIME_STEP
     np.testing.assert_allclose(first, expected, atol=5e-3)
 
 
@@ -107,9 +107,9 @@ def test_another_engine_gives_the_same(engine: str) -> None:
             "--engine",
             engine,
             "--step",
-            str(fmus.STEP),
+            str(fmus.TIME_STEP),
             "--stop",
-            str(fmus.STEP * STEPS),
+            str(fmus.TIME_STEP * STEPS),
             "--out",
             str(out),
         ],

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from cosim import closed_loop, closed_loop_stability_report
-from cosim.closed_loop_sources import STEP, Known, Perfect, Strain
+from cosim.closed_loop_sources import TIME_STEP, Known, Perfect, Strain
 from cosim.closed_loop_stability import (
     StabilityController,
     StabilityOutcome,
@@ -52,12 +52,12 @@ def test_the_brake_keeps_within_load_and_slip_and_waits_for_knowledge() -> None:
 
 def test_the_driver_steers_a_sine_that_dwells() -> None:
     road = Swerve()
-    times = np.arange(0.0, road.lasts, STEP)
+    times = np.arange(0.0, road.lasts, TIME_STEP)
     angle = np.array([road.steer(time) for time in times])
     assert angle.max() == pytest.approx(road.angle, rel=1e-3)
-    held = np.isclose(angle, -road.angle, rtol=1e-3).sum() * STEP
+    held = np.isclose(angle, -road.angle, rtol=1e-3).sum() * TIME_STEP
     assert held == pytest.approx(road.dwell, abs=0.04)
-    assert np.abs(np.diff(angle)).max() < 1.1 * road.angle * 2 * np.pi * road.frequency * STEP
+    assert np.abs(np.diff(angle)).max() < 1.1 * road.angle * 2 * np.pi * road.frequency * TIME_STEP
     assert not angle[times < road.rolling].any()
     assert angle[-1] == 0.0
 

@@ -12,7 +12,7 @@ pytest.importorskip("vehiclemodels", reason="commonroad-vehicle-models is not in
 from cosim.calibrate import CALIBRATION
 from cosim.drill import AFTER, BEFORE, CASES
 from cosim.manoeuvres import Driver, Manoeuvre, ramp
-from cosim.recording import STEP, VEHICLE, Recording, build_fmus, follow, record
+from cosim.recording import TIME_STEP, VEHICLE, Recording, build_fmus, follow, record
 from cosim.run import reached, series
 from cosim.score import LIMITS, in_range, score, turns_of
 from cosim.vehicle import Controls, G, Motion, Vehicle
@@ -152,7 +152,7 @@ def test_an_estimate_is_of_its_contact_and_comes_in_time(left: Recording) -> Non
     for wheel in range(len(WHEELS)):
         turns = turns_of(left, wheel)
         angle = left.told["tire_angle"][:, wheel]
-        at = (turns.contact / STEP).astype(int)
+        at = (turns.contact / TIME_STEP).astype(int)
         np.testing.assert_allclose(angle[at], 0.0, atol=np.radians(4.0))  # gages over the road
         assert np.all(turns.lag > 0.0)
         assert np.all(turns.lag <= turns.allowed)
@@ -162,7 +162,7 @@ def test_an_estimate_is_held_against_the_truth_at_its_contact(braked: Recording)
     """The slip ratio too, and not against its mean over the turn before."""
     for wheel in range(len(WHEELS)):
         turns = turns_of(braked, wheel)
-        at = (turns.contact / STEP).astype(int)
+        at = (turns.contact / TIME_STEP).astype(int)
         for name in ("Fz", "alpha", "kappa"):
             np.testing.assert_array_equal(turns.truth[name], braked.truth[name][at, wheel])
         assert np.ptp(turns.truth["kappa"]) > 0.005
@@ -189,11 +189,11 @@ def test_out_of_range_valid_drops_within_two_turns(fmus: tuple[Path, Path]) -> N
         changed = getattr(out, name).copy()
         changed[at] = value
         out = replace(out, **{name: changed})
-    before, after = round(0.6 * BEFORE / STEP), round(0.35 * AFTER / STEP)
+    before, after = round(0.6 * BEFORE / TIME_STEP), round(0.35 * AFTER / TIME_STEP)
     with FourWheels(*fmus) as wheels:
         told = follow([steady] * before + [out] * after, wheels)
     assert np.all(told["valid"][before - 1] == 1.0)
-    two_turns = round(4.0 * np.pi / told["tire_omega"][before - 1, 0] / STEP)
+    two_turns = round(4.0 * np.pi / told["tire_omega"][before - 1, 0] / TIME_STEP)
     assert not told["valid"][before + two_turns :, :3].any()
     assert told["valid"][before:, 3].all()
 
@@ -206,7 +206,7 @@ def test_every_wheel_has_the_friction_of_the_road_under_it(wheels: FourWheels) -
         friction=OWN_FRICTION * factor,
     )
     wheels.start(state)
-    told = wheels.step(0.0, STEP, state)
+    told = wheels.step(0.0, TIME_STEP, state)
     left_out = virtual_host.friction().about["left_out"]["friction 0.3 .. 0.5"]["Fy_N_rms"]
     np.testing.assert_allclose(
         -told.tire_fy, 0.97 * OWN_FRICTION * factor * 4000.0, rtol=0.05, atol=left_out
@@ -219,10 +219,10 @@ def test_a_slippery_road_is_refused_by_a_virtual_tire_that_knows_one_friction(
     state = WheelStates(*(np.full(len(WHEELS), x) for x in (4000.0, 0.0, 0.0, 0.0, 20.0)))
     with FourWheels(virtual_host.file(10), fmus[1]) as wheels:
         wheels.start(state)
-        wheels.step(0.0, STEP, state)
+        wheels.step(0.0, TIME_STEP, state)
         slippery = replace(state, friction=np.array([OWN_FRICTION, 0.5, 0.5, 0.5]))
         with pytest.raises(ParameterError, match=r"tire_FR: friction = 0.5, .*allowed is 0.95"):
-            wheels.step(STEP, STEP, slippery)
+            wheels.step(TIME_STEP, TIME_STEP, slippery)
 
 
 def test_a_wheel_speed_sensor_tells_the_turn_rate_of_the_tire_that_is_seen(
@@ -234,7 +234,7 @@ def test_a_wheel_speed_sensor_tells_the_turn_rate_of_the_tire_that_is_seen(
     state = WheelStates(*(np.full(len(WHEELS), x) for x in (4000.0, 0.0, 0.0, 0.0, 20.0)))
     state = replace(state, omega=np.array([np.nan, 50.0, np.nan, np.nan]))
     wheels.start(state)
-    own = wheels.step(0.0, STEP, state).tire_omega
+    own = wheels.step(0.0, TIME_STEP, state).tire_omega
     told = np.array(seen)[:, HELD.index("omega")]
     np.testing.assert_array_equal(told, [own[0], 50.0, own[2], own[3]])
 
@@ -245,7 +245,7 @@ def test_water_is_refused_without_a_table_and_added_with_one(wheels: FourWheels)
     wet = replace(dry, wedge=np.array([0.0, 1e5, 0.0, 0.0]))
     wheels.start(dry)
     with pytest.raises(ParameterError, match=r"wedge = 100000 Pa, .*cosim.water.water_table"):
-        wheels.step(0.0, STEP, wet)
+        wheels.step(0.0, TIME_STEP, wet)
     angle = np.linspace(-np.pi, np.pi, 9)[:-1]
     change = np.zeros((2, 2, 8, 5))
     change[:, 1] = angle[:, None]
@@ -258,7 +258,7 @@ def test_water_is_refused_without_a_table_and_added_with_one(wheels: FourWheels)
 
 def test_the_vehicle_tells_the_friction_under_its_wheels() -> None:
     factor = (0.5, 1.0, 0.4, 0.8)
-    told = Vehicle(VEHICLE, 20.0).step(STEP, Controls(friction=factor)).wheels
+    told = Vehicle(VEHICLE, 20.0).step(TIME_STEP, Controls(friction=factor)).wheels
     np.testing.assert_allclose(told.friction, OWN_FRICTION * np.array(factor))
 
 
@@ -292,7 +292,7 @@ def test_the_page_names_what_is_not_reached(braked: Recording, tmp_path: Path) -
     strict = dict.fromkeys(LIMITS, 1e-09)
     document = {
         "vehicle": "one",
-        "step_s": STEP,
+        "step_s": TIME_STEP,
         "limits": strict,
         "manoeuvres": scores,
         "range": checks,
@@ -328,7 +328,7 @@ def test_strain_tires_are_told_the_tread_and_the_friction_only_where_asked(
         with FourWheels(*fmus, tells_friction=asked) as wheels:
             monkeypatch.setattr(wheels, "_estimate", lambda *given, to=seen: to.append(given[3]))
             wheels.start(state)
-            wheels.step(0.0, STEP, state)
+            wheels.step(0.0, TIME_STEP, state)
         told = np.array(seen)
         np.testing.assert_array_equal(told[:, HELD.index("friction")], friction)
         np.testing.assert_array_equal(told[:, HELD.index("tread_depth")], 0.008)

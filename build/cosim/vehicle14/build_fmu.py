@@ -25,7 +25,7 @@ from tirelib.fmu.variables import Variable
 MODEL = "VehicleModel"
 PARTS = ("__init__.py", "model.py", "parameters.py", "port.py", "run.py", "tire.py")
 """Modules that the FMU carries."""
-STEP, STEPS = 1e-3, 150
+TIME_STEP, STEP_COUNT = 1e-3, 150
 _LEAD = (
     "A car with 14 degrees of freedom: body 6, suspension 4, wheel spin 4; steering, drive and "
     "brake torques, friction and height of the road at each wheel in; load, slip, camber, speed "
@@ -55,7 +55,7 @@ def vehicle_spec() -> SlaveSpec:
         script="vehicle_model.py",
         description="Car with 14 degrees of freedom: controls and road in, wheels out",
         table=table,
-        step_size=STEP,
+        step_size=TIME_STEP,
         settings={"library": library},
         resources={
             "tire.toml": TIRE_FILE.read_bytes(),
@@ -90,9 +90,9 @@ def _page(table: list[Variable]) -> str:
 
 def reference_signals() -> Reference:
     """Return input and expected output: steer, then brakes on a split road, over a bump."""
-    time: FloatArray = STEP * np.arange(STEPS, dtype=np.float64)
+    time: FloatArray = TIME_STEP * np.arange(STEP_COUNT, dtype=np.float64)
     usual = {v.name: float(v.start) for v in port.inputs(Variable)}
-    given: dict[str, FloatArray] = {name: np.full(STEPS, usual[name]) for name in port.INPUTS}
+    given: dict[str, FloatArray] = {name: np.full(STEP_COUNT, usual[name]) for name in port.INPUTS}
     given["steer_front"] = np.where(time > 0.01, 0.02, 0.0)
     for wheel, torque in zip(("FL", "FR", "RL", "RR"), (900.0, 900.0, 300.0, 300.0), strict=True):
         given[f"brake_{wheel}"] = np.where(time > 0.05, torque, 0.0)
@@ -103,11 +103,11 @@ def reference_signals() -> Reference:
     vehicle = port.Port(usual_tires(), start, rows[0].tolist())
     shown = [_row(vehicle)]
     for row in rows[:-1]:
-        vehicle.step(STEP, row.tolist())
+        vehicle.step(TIME_STEP, row.tolist())
         shown.append(_row(vehicle))
     names = [v.name for v in port.outputs(Variable) if v.kind != "String"]
     found = np.array(shown)
-    return Reference(STEP, given, {name: found[:, i] for i, name in enumerate(names)})
+    return Reference(TIME_STEP, given, {name: found[:, i] for i, name in enumerate(names)})
 
 
 def _row(vehicle: port.Port) -> list[float]:
