@@ -7,7 +7,6 @@ the gages against the trigger.
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -15,8 +14,7 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.effects import Effect
 from tirelib.effects.state import Operating, State
 from tirelib.inference.identify.campaign_data import StraightRuns, begins_with
-from tirelib.inference.identify.delay import STD, UNIT, by_delay, earlier
-from tirelib.inference.identify.literature import literature
+from tirelib.inference.identify.delay import STD, UNIT, earlier
 from tirelib.inference.identify.random_effects import scales, tangents
 from tirelib.inference.problems.strain_laws import (
     LOOKALIKE_SHARE,
@@ -27,79 +25,22 @@ from tirelib.inference.problems.strain_laws import (
     stiffened,
 )
 from tirelib.inference.problems.strain_living import in_base, living
+from tirelib.inference.problems.strain_prior import MEAN, WIDTH, as_in_literature
+from tirelib.inference.problems.strain_slopes import StrainSlopes, StrainSolved, changes_at
 from tirelib.inference.problems.whiten_strain import INSIDE, Whitener
 from tirelib.inference.statistics.problem import FOLLOWED, Point
 from tirelib.measured.waveforms import GRID
 from tirelib.model import solution
 from tirelib.model.base import coordinates, move
-from tirelib.model.chain import Changes
-from tirelib.model.slopes import SolutionSlopes, added_by_values, by_effects, by_values
+from tirelib.model.slopes import by_effects, by_values
 from tirelib.model.solution import Solution
 from tirelib.physics.rolling.assemble import Unknowns
 from tirelib.physics.rolling.solve import Rolling
 
-WIDTH = {
-    "bending_stiffness": 0.7,
-    "radial_stiffness": 0.7,
-    "radial_pressure_slope": 1.5,
-    "tangential_stiffness": 1.0,
-    "tangential_pressure_slope": 1.5,
-    "tread_stiffness": 0.9,
-    "innerliner_offset": 0.15,
-    "extension_stiffness": 0.7,
-    "shear_stiffness": 0.7,
-    "rotary_inertia": 1.0,
-    "tread_shear_stiffness": 1.0,
-    "tread_hardening": 0.7,
-    "section_pull": 1.5,
-    "liner_share": 1.0,
-    "tread_poisson": 1.0,
-    "contact_crown": 1.3,
-    "creep": 1.3,
-    "tread_spread": 1.3,
-    "centrifugal_tension": 0.01,
-}
-"""Prior standard deviations of the base's coordinates: wide, the campaign informs them."""
-ROUND = "contact_crown"
-"""The number by which a base has two valleys."""
-MEAN = {"centrifugal_tension": 1.0}
-"""Means of priors that are narrow. All others stand about the model's own numbers."""
 OWN = 0.004
 """A run's own misfit over its rms strain, in the contact."""
-LEAST_STEP = 1e-3
-STRENGTH_MOVE = 0.05
-"""Move of a strength, in ranges, within which what it adds to the slopes is kept."""
-BASE_MOVE = 0.03
-"""The same of the base's coordinates."""
 UNKNOWN_NOISE = 0.005
 """Noise over the rms strain where there are no repeats."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class StrainSolved:
-    """The model at a point, `tirelib.inference.statistics.problem.Solved`.
-
-    Attributes
-    ----------
-    rest : shape (n_runs, n_phi)
-        Measured less model.
-    point : Point
-    model : Solution
-    delay : float, [s]
-    waveform : shape (n_runs, n_phi)
-        The model's waveforms, with the delay.
-    """
-
-    rest: FloatArray
-    point: Point
-    model: Solution
-    delay: float
-    waveform: FloatArray
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Leave the effects' changes out, which are functions; the point makes them again."""
-        bare = replace(self.model, changes=())
-        return _with_changes, (self.rest, self.point, bare, self.delay, self.waveform)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,31 +73,6 @@ class Reference:
             self.half_angle[chosen],
             self.point,
             self.rolling.take(chosen),
-        )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Added:
-    """Slopes that cost much, and the point they were taken at."""
-
-    point: Point
-    slopes: FloatArray
-
-    def serves(self, point: Point, *, near: bool) -> bool:
-        """Return whether these slopes are a point's own, or with `near` so near that they do."""
-        if self.point is point or not near:
-            return self.point is point
-        same = self.point.effects == point.effects
-        near = float(np.abs(self.point.base - point.base).max()) < BASE_MOVE
-        return (
-            same
-            and near
-            and all(
-                float(np.abs(a - b).max()) < STRENGTH_MOVE * effect.scale
-                for effect, a, b in zip(
-                    point.effects, self.point.strengths, point.strengths, strict=True
-                )
-            )
         )
 
 
@@ -194,9 +110,7 @@ class StrainProblem:
         self.ends = low, high
         typical = float(np.sqrt(np.mean(runs.strain**2)))
         noise = runs.noise.std if runs.noise.known else UNKNOWN_NOISE * typical
-        self._last: tuple[StrainSolved, SolutionSlopes] | None = None
-        self._added: _Added | None = None
-        self._strengths: _Added | None = None
+        self._slopes = StrainSlopes(self.free)
         self.noise = np.full(len(self.data.points), noise)
         self.present = len(self.data.points)  # runs that are measured: the first ones
         self._scale = scales(self.data.tolerance, self.data.angle_std)
@@ -214,22 +128,9 @@ class StrainProblem:
 
     @property
     def starts(self) -> tuple[Point, Point]:
-        """The model as it is given, and with the base of a tire as the literature has it.
-
-        Numbers that fit the runs well without an effect may lie in another valley than those that
-        fit them with it. Treads that are round across and stiff, and flat and soft, are such
-        valleys: the second start lies in the one in which the model is not.
-        """
-        known = literature(float(np.max(self.values["pressure"])))
-        there = {c.name: known[c.name].value for c in self.free if c.name in known}
-        moves = np.zeros(len(self.free) + 1)
-        for k, c in enumerate(self.free):
-            own = float(np.max(self.values[c.name]))
-            if c.name in there and (c.unit or own):  # no factor moves a zero
-                moves[k] = c.distance(own, there[c.name])
-            if c.name == ROUND and moves[k] > -0.5 * WIDTH[ROUND]:
-                moves[k] += WIDTH[ROUND]
-        return self.start, replace(self.start, base=moves)
+        """The model as it is given, and with the base of a tire as the literature has it."""
+        moves = as_in_literature(self.values, self.free)
+        return self.start, replace(self.start, base=np.append(moves, 0.0))
 
     @property
     def half_angle(self) -> FloatArray:
@@ -251,6 +152,7 @@ class StrainProblem:
             return self
         out = copy(self)
         out.reference, out._whiteners = self._referred(solved), {}
+        out._slopes = copy(self._slopes)
         return out
 
     def followed_by(self, points: Operating, repeats: FloatArray) -> "StrainProblem":
@@ -324,7 +226,7 @@ class StrainProblem:
         """Return the problem of the same runs, each the mean of so many."""
         out = copy(self)
         out.noise, out._scale = self.noise / np.sqrt(times), self._scale / np.sqrt(times)
-        out._whiteners = {}
+        out._slopes, out._whiteners = copy(self._slopes), {}
         return out
 
     def whitener(self, own: float) -> Whitener:
@@ -348,11 +250,12 @@ class StrainProblem:
 
     def forget(self) -> None:
         """Forget slopes that only save time, so that a fit does not depend on those before it."""
-        self._last = self._added = self._strengths = None
+        self._slopes = StrainSlopes(self.free)
 
     def solve(self, point: Point, near: StrainSolved | None = None) -> StrainSolved:
         """Return the model at a point; raises TirelibError where it has none."""
-        return self._solved(point, self._guess(point, near))
+        start = self.reference.rolling if near is None else self._slopes.start(point, near)
+        return self._solved(point, start)
 
     def _solved(self, point: Point, start: Rolling | Unknowns | None) -> StrainSolved:
         """Return the model at a point from a start of the contact."""
@@ -367,60 +270,12 @@ class StrainProblem:
         """Return the model at operating points; raises TirelibError where it has none."""
         values = move(self.values, point.base[:-1], self.free)
         return solution.solved(
-            values, points, _changes(point), low_pass=self.data.low_pass, start=start
+            values, points, changes_at(point), low_pass=self.data.low_pass, start=start
         )
-
-    def _guess(self, point: Point, near: StrainSolved | None) -> Rolling | Unknowns:
-        """Return a start of the contact: a solution nearby, moved along its slopes if known."""
-        if near is None:
-            return self.reference.rolling
-        if self._last is None or self._last[0] is not near:
-            return near.model.rolling
-        return self._last[1].start(near.model, (point.base - near.point.base)[:-1])
 
     def slopes(self, point: Point, solved: StrainSolved, *, near: bool = False) -> FloatArray:
-        """Return slopes by the base, the delay and strengths in ranges.
-
-        With `near`, slopes by strengths, and of what they add to the base, may be those of a point
-        nearby: they cost most.
-        """
-        if self._last is None or self._last[0] is not solved:
-            self._last = (solved, by_values(solved.model, self.free))
-        slopes = self._last[1].waveform[: len(self.free)]
-        if self._bends(point):
-            if self._added is None or not self._added.serves(point, near=near):
-                more = added_by_values(solved.model, self.free, LEAST_STEP)
-                self._added = _Added(point, more)
-            slopes = slopes + self._added.slopes
-        rows = np.concatenate([slopes, self._by_strengths(point, solved, near=near)])
-        late = earlier(rows, self.data.points.omega, -solved.delay)
-        delay = by_delay(solved.waveform, self.data.points.omega)[None]
-        return np.concatenate([late[: len(self.free)], delay, late[len(self.free) :]])
-
-    def _by_strengths(self, point: Point, solved: StrainSolved, *, near: bool) -> FloatArray:
-        """Return slopes by strengths in ranges, without the delay."""
-        if self._strengths is not None and self._strengths.serves(point, near=near):
-            return self._strengths.slopes
-        there, steps = [], []
-        for k, effect in enumerate(point.effects):
-            for j in range(effect.components):
-                steps.append(LEAST_STEP * effect.toward)
-                strength = point.strengths[k].copy()
-                strength[j] += steps[-1]
-                there.append((k, effect.at(_numbers(strength))))
-        rows = np.zeros((0, *solved.waveform.shape))
-        if there:
-            rows = by_effects(solved.model, there, steps).waveform * self._scales(point.effects)
-        self._strengths = _Added(point, rows)
-        return rows
-
-    def _bends(self, point: Point) -> bool:
-        """Return whether effects are strong enough to matter to the slopes of the base."""
-        return any(
-            effect.hook in ("contact", "strain")
-            and float(np.abs(s).max()) >= STRENGTH_MOVE * effect.scale
-            for effect, s in zip(point.effects, point.strengths, strict=True)
-        )
+        """Return slopes by the base, the delay and strengths in ranges, see `StrainSlopes.at`."""
+        return self._slopes.at(point, solved, near=near)
 
     def signature(self, solved: StrainSolved, effect: Effect) -> FloatArray:
         """Return changes (components, n_runs, n_phi) for a strength of one range."""
@@ -429,11 +284,6 @@ class StrainProblem:
         steps = [effect.step] * effect.components
         rows = by_effects(solved.model, there, steps).waveform * effect.scale
         return earlier(rows, self.data.points.omega, -solved.delay)
-
-    def _scales(self, effects: Sequence[Effect]) -> FloatArray:
-        """Return the ranges of strengths, (n_components, 1, 1)."""
-        each = [effect.scale for effect in effects for _ in range(effect.components)]
-        return np.array(each)[:, None, None]
 
     def remainder(self, point: Point, solved: StrainSolved) -> dict[str, FloatArray]:
         """Return smooth shapes over the wheel angle, by how they go with a run's conditions."""
@@ -469,20 +319,3 @@ class StrainProblem:
                 ]
             out.append(np.concatenate(errors))
         return out
-
-
-def _with_changes(
-    rest: FloatArray, point: Point, bare: Solution, delay: float, waveform: FloatArray
-) -> StrainSolved:
-    return StrainSolved(rest, point, replace(bare, changes=_changes(point)), delay, waveform)
-
-
-def _changes(point: Point) -> Changes:
-    return [
-        effect.at(_numbers(s)) for effect, s in zip(point.effects, point.strengths, strict=True)
-    ]
-
-
-def _numbers(strength: FloatArray) -> float | tuple[float, ...]:
-    """Return a strength as effects take it."""
-    return float(strength[0]) if strength.size == 1 else tuple(strength.tolist())

@@ -22,7 +22,8 @@ from tirelib.inference.diagnose.diagnose import plain_tires
 from tirelib.inference.diagnose.strain_models import Fitted
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.identify.delay import UNIT, by_delay, earlier
-from tirelib.inference.problems.strain import WIDTH, StrainProblem
+from tirelib.inference.problems.strain import StrainProblem
+from tirelib.inference.problems.strain_prior import WIDTH
 from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.inference.statistics.posterior import Posterior, posterior
 from tirelib.measured.waveforms import GRID
