@@ -208,16 +208,14 @@ def test_a_missing_campaign_is_named(campaigns: Path, tmp_path: Path) -> None:
     assert "set1-unseen" in done.stderr
 
 
-def test_the_library_refuses_another_tire(campaigns: Path, tmp_path: Path) -> None:
+def test_the_library_refuses_another_tire(made: tuple[Path, str], tmp_path: Path) -> None:
     from pages.demo import write_demo_page
 
-    from tirelib.campaign import read_campaign
     from tirelib.core.errors import CalibrationError
-    from tirelib.estimators.train import train
-    from tirelib.measured.observations import observe
+    from tirelib.estimators.calibration_file import read_calibration
 
     runs = [run for run in cornering_runs() if np.isclose(run.plan.load, 4500.0)]
-    calibration = train(observe([read_campaign(campaigns / "set1")])).calibration
+    calibration = read_calibration(made[0] / "calibration.toml")
     other = write(tmp_path / "set1", runs, name="set1", tire="another tire")
     with pytest.raises(CalibrationError, match="another tire"):
         write_demo_page(tmp_path, {"set1": other, "set1-unseen": other}, calibration)

@@ -19,7 +19,11 @@ from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import write_tire
 
 PLANTED = {"friction_pressure": 0.3, "stiffness_temperature": 0.5, "brush_camber": 0.08}
-PAIR = ("--suspects", "friction_pressure,friction_drift")
+PAIR = (
+    *("--suspects", "friction_pressure,friction_drift"),
+    *("--load-range", 1700, 1700, "--camber-range", 0, 0, "--temperature-range", 60, 60),
+)
+"""Two suspects, and runs in which nothing but the pressure is to be chosen."""
 MINE = """
 from tirelib.effects import effect
 
@@ -152,40 +156,36 @@ def test_the_report_is_one_file_with_its_figures(place: Path, told: dict[str, An
     assert told["named"][0] in words
 
 
+@pytest.fixture(scope="module")
+def grown(place: Path, told: dict[str, Any]) -> list[dict[str, Any]]:
+    """Add what was named, one after the other: M2.toml, M3.toml and M4.toml."""
+    model, found = place / "M.toml", []
+    for k, name in enumerate(told["named"], start=2):
+        target = place / f"M{k}.toml"
+        words = ("--data", place / "sweep", "--out", target, "--json", place / "A.json")
+        found.append(done("add", name, "--model", model, *words))
+        model = target
+    return found
+
+
 def test_adding_what_was_named_lets_the_held_out_error_fall_step_by_step(
-    place: Path, told: dict[str, Any]
+    place: Path, told: dict[str, Any], grown: list[dict[str, Any]]
 ) -> None:
-    model, errors = place / "M.toml", []
-    for k, name in enumerate(told["named"]):
-        target = place / f"M{k + 2}.toml"
-        added = done(
-            "add",
-            name,
-            "--model",
-            model,
-            "--data",
-            place / "sweep",
-            "--out",
-            target,
-            "--json",
-            place / "A.json",
-        )
+    for added in grown:
         assert added["quantity"] == "Fy"
         assert added["error_after"] < added["error_before"]
         assert added["heldout_error_after"] < added["heldout_error_before"]
         assert added["in_range"]
         assert added["std"] > 0.0
-        errors.append(added["heldout_error_after"])
-        model = target
+    errors = [added["heldout_error_after"] for added in grown]
     assert errors == sorted(errors, reverse=True)
     # noise is of the data alone: the next step starts where the one before has ended
     assert added["error_before"] == pytest.approx(added["history"][-2]["error_after"], rel=1e-4)
     assert [entry["effect"] for entry in added["history"]] == told["named"]
     # what is left is near the floor that the shape of the brush leaves
     assert added["error_after"] < 1.3 * added["floor"]
-    again = done(
-        "compare", place / "sweep", "--model", model, "--quantity", "Fy", "--json", place / "C.json"
-    )
+    words = ("--model", place / "M4.toml", "--quantity", "Fy", "--json", place / "C.json")
+    again = done("compare", place / "sweep", *words)
     assert [used["effect"] for used in again["effects"]] == told["named"]
     assert again["error"] == pytest.approx(added["error_after"], rel=0.02)
 
@@ -212,7 +212,6 @@ def test_the_next_test_of_forces_is_the_diagnosis_s_advice(
 
 
 def test_a_point_in_the_place_of_a_sweep_may_be_asked_for(place: Path) -> None:
-    ranges = ("--load-range", 1700, 1700, "--camber-range", 0, 0, "--temperature-range", 60, 60)
     plan = done(
         "next-test",
         place / "sweep",
@@ -221,7 +220,6 @@ def test_a_point_in_the_place_of_a_sweep_may_be_asked_for(place: Path) -> None:
         "--quantity",
         "Fy",
         *PAIR,
-        *ranges,
         "--no-sweep",
         "--json",
         place / "P.json",
@@ -232,13 +230,11 @@ def test_a_point_in_the_place_of_a_sweep_may_be_asked_for(place: Path) -> None:
 
 
 def test_undo_goes_back_to_the_digit_and_remove_fits_anew(
-    place: Path, tmp_path: Path, told: dict[str, Any]
+    place: Path, tmp_path: Path, told: dict[str, Any], grown: list[dict[str, Any]]
 ) -> None:
     first, second = told["named"][:2]
-    one, two = tmp_path / "1.toml", tmp_path / "2.toml"
+    one, two, added = place / "M2.toml", place / "M3.toml", grown[1]
     words = ("--data", place / "sweep", "--quantity", "Fy", "--json", tmp_path / "A.json")
-    done("add", first, "--model", place / "M.toml", "--out", one, *words)
-    added = done("add", second, "--model", one, "--out", two, *words)
     call("add", "--undo", "--model", two, "--out", tmp_path / "back.toml")
     assert (tmp_path / "back.toml").read_bytes() == one.read_bytes()
     gone = done("add", second, "--remove", "--model", two, "--out", tmp_path / "3.toml", *words)

@@ -20,15 +20,19 @@ THREADS, SAMPLES = 4, 10
 RACES = ("-g", "-O1", "-fsanitize=thread")
 
 
-def compiled(out: Path, *flags: str) -> Path:
-    """Compile the sources of the FMU, and the host that loads them, with the same flags."""
+def compiled_library(out: Path, *flags: str) -> Path:
+    """Compile the sources of the FMU."""
     rooms = [SOURCE, *(SOURCE.parent / room for room in ("tire", "slave", "fmi2", "fmi3"))]
     sources = sorted(source for room in rooms for source in room.glob("*.c"))
-    common = ["gcc", *native_fmu.C99, *native_fmu.STRICT, *flags]
-    library = [*sources, "-shared", "-fPIC", "-lm", "-o", out.with_suffix(".so")]
-    subprocess.run([*common, *library], check=True)
-    host = ["gcc", "-std=c99", *flags, HOST, "-ldl", "-lm", "-pthread", "-o", out]
-    subprocess.run(host, check=True)
+    command = ["gcc", *native_fmu.C99, *native_fmu.STRICT, *flags, *sources]
+    subprocess.run([*command, "-shared", "-fPIC", "-lm", "-o", out], check=True)
+    return out
+
+
+def compiled_host(out: Path, *flags: str) -> Path:
+    """Compile the host that loads them."""
+    command = ["gcc", "-std=c99", *flags, HOST, "-ldl", "-lm", "-pthread", "-o", out]
+    subprocess.run(command, check=True)
     return out
 
 
@@ -38,7 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if shutil.which("gcc") is None or sys.platform != "linux":
         pytest.skip("no gcc on this machine, or it is not Linux")
     out = tmp_path_factory.mktemp("threads")
-    compiled(out / "plain", "-O1")
+    compiled_host(out / "plain", "-O1")
     strain = live.strain_of(4e3, 0.05, turns=4.4)[0]
     n = strain.shape[1] // SAMPLES
     known = {"speed": live.SPEED, "pressure": live.PRESSURE, "camber": 0.0}
@@ -65,22 +69,22 @@ def run(host: Path, library: Path, fmu: Path, threads: int) -> list[np.ndarray]:
 
 
 def test_threads_get_what_one_alone_gets(folder: Path, fmu: Path) -> None:
-    library = fmu / "binaries" / "linux64" / "StrainTire.so"
-    (alone,) = run(folder / "plain", library, fmu, 1)
+    shipped = fmu / "binaries" / "linux64" / "StrainTire.so"
+    (alone,) = run(folder / "plain", shipped, fmu, 1)
     first, second = np.split(alone, 2)
     np.testing.assert_array_equal(first, second)
     assert np.isfinite(first[-1]).any()
-    for one in run(folder / "plain", library, fmu, THREADS):
+    for one in run(folder / "plain", shipped, fmu, THREADS):
         np.testing.assert_array_equal(one, alone)
 
 
 def test_an_importer_may_trap_exceptions_round_upwards_and_have_small_stacks(
     folder: Path, fmu: Path
 ) -> None:
-    compiled(folder / "odd", "-O1", "-DODD")
-    library = fmu / "binaries" / "linux64" / "StrainTire.so"
-    (alone,) = run(folder / "plain", library, fmu, 1)
-    for one in run(folder / "odd", library, fmu, THREADS):
+    odd = compiled_host(folder / "odd", "-O1", "-DODD")
+    shipped = fmu / "binaries" / "linux64" / "StrainTire.so"
+    (alone,) = run(folder / "plain", shipped, fmu, 1)
+    for one in run(odd, shipped, fmu, THREADS):
         np.testing.assert_array_equal(one, alone)
 
 
@@ -90,7 +94,7 @@ def test_the_thread_sanitizer_sees_no_race(folder: Path, fmu: Path) -> None:
     command = ["gcc", *RACES, empty, "-o", empty.with_suffix("")]
     if subprocess.run(command, check=False, capture_output=True).returncode:
         pytest.skip("the thread sanitizer is not installed")
-    compiled(folder / "races", *RACES)
-    (alone,) = run(folder / "plain", folder / "plain.so", fmu, 1)
-    for one in run(folder / "races", folder / "races.so", fmu, THREADS):
+    watched = compiled_library(folder / "races.so", *RACES)
+    (alone,) = run(folder / "plain", compiled_library(folder / "plain.so", "-O1"), fmu, 1)
+    for one in run(compiled_host(folder / "races", *RACES), watched, fmu, THREADS):
         np.testing.assert_array_equal(one, alone)
