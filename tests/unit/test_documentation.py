@@ -1,11 +1,12 @@
 """The documentation: it builds, its links lead somewhere, its commands exist, its tutorials run."""
 
 import json
+import os
 import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
+from tests.chain.test_command_line import run
 from tests.schema_check import SCHEMAS, wrong_documents
 from tirebench.cli import program as bench
 from tirelib.cli import program
@@ -175,11 +177,30 @@ def test_every_tutorial_has_a_number() -> None:
     assert set(NUMBERS) == scripts == set(imported("tables", DOCS).ORDER)
 
 
+IN_ITS_OWN = subprocess.run
+
+
+def in_this_process(
+    command: Any, *, env: Mapping[str, str] = os.environ, **options: Any
+) -> subprocess.CompletedProcess[str]:
+    """Run `python -m tirelib ...` without a process of its own, whose imports take a second."""
+    if command[:3] != [sys.executable, "-m", "tirelib"]:
+        return IN_ITS_OWN(command, env=env, **options)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(options["cwd"])
+        patch.setenv("COLUMNS", env.get("COLUMNS", "80"))
+        done = run(*command[3:])
+    if options["check"]:
+        done.check_returncode()
+    return done
+
+
 @pytest.mark.parametrize("name", NUMBERS)
 def test_a_tutorial_runs_and_ends_with_its_number(name: str, monkeypatch: Any) -> None:
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("agg")
     monkeypatch.syspath_prepend(str(DOCS / "tutorials"))
+    monkeypatch.setattr(subprocess, "run", in_this_process)
     path = DOCS / "tutorials" / f"{name}.py"
     found: dict[str, Any] = {"__name__": name, "__file__": str(path)}
     try:
