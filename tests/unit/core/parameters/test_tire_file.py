@@ -129,7 +129,10 @@ def files(draw: st.DrawFn) -> TireFile:
     return TireFile(draw(text), numbers, draw(st.dictionaries(keys, st.just({"a": 1}), max_size=2)))
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+    max_examples=10,  # each holds every number of a tire
+)
 @given(files())
 def test_a_written_tire_reads_back_from_one_unit_a_quantity(tmp_path: Path, file: TireFile) -> None:
     write_tire(file, tmp_path / "t.toml")
