@@ -327,7 +327,7 @@ def force_sign_findings(
 FOLLOWS = {"Fy": "slip angle", "Mz": "Fy at small slip angles"}
 """What the sign of a force is held against. The aligning moment is that of the lateral force behind
 the middle of the contact, Mz = -t Fy with the trail t > 0, in every axis system."""
-SMALL = 0.05
+LARGEST_TRAIL_ANGLE = 0.05
 """Slip angle up to which the trail of a tire is clear, [rad]: it vanishes where the contact slides,
 from 5 deg on. Half (1.4 deg) leaves few samples, double (5.7 deg) is where the moment turns."""
 LEAST_TRAIL = 0.005
@@ -362,7 +362,7 @@ def moment_sign_of(run: Run) -> ForceSign:
     if not {"Fy", "Mz", "slip_angle"} <= set(run.rig):
         return ForceSign(run.plan.file, None, "Mz")
     force, moment = run.rig["Fy"], run.rig["Mz"]
-    telling = _telling(run, 0.5) & (np.abs(run.rig["slip_angle"]) < SMALL)
+    telling = _telling(run, 0.5) & (np.abs(run.rig["slip_angle"]) < LARGEST_TRAIL_ANGLE)
     telling &= np.abs(moment) > LEAST_TRAIL * np.abs(force)
     if "slip_ratio" in run.rig:  # a longitudinal force has a moment of its own
         telling &= np.abs(run.rig["slip_ratio"]) < 0.02

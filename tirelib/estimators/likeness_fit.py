@@ -20,7 +20,7 @@ SPARE = 3
 CORNERING = 0.2
 """Share of the largest lateral distortion beyond which a wheel corners; and share of a condition's
 range that it must cover there."""
-SMALL = 1e-6
+PENALTY = 1e-6
 """Penalty of the least squares, relative: terms that the data cannot tell apart stay small."""
 
 
@@ -133,7 +133,7 @@ def _terms(varying: set[str], with_side: set[str]) -> tuple[list[Powers], list[P
 
 def _left_out(x: FloatArray, y: FloatArray, groups: IntArray) -> tuple[FloatArray, FloatArray]:
     """Return least-squares coefficients, and the errors of each condition by a fit without it."""
-    inverse = np.linalg.inv(x.T @ x + SMALL * len(y) * np.eye(x.shape[1]))
+    inverse = np.linalg.inv(x.T @ x + PENALTY * len(y) * np.eye(x.shape[1]))
     found = inverse @ x.T @ y
     hat, rest = x @ inverse @ x.T, y - x @ found
     error = np.empty_like(rest)

@@ -22,7 +22,7 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 
 MOST_STEPS = 500
 """Steps after which the iteration ends where it is."""
-CLOSE = 1e-5
+LEAST_CHANGE = 1e-5
 """Change of all coefficients together, standardised, that ends the iteration."""
 FAINT = 1e-6
 """Shape and rate of the gamma priors of both precisions: nearly nothing is known before."""
@@ -145,7 +145,7 @@ def _maximise(parts: list[_Part]) -> tuple[FloatArray, FloatArray, FloatArray]:
         whole = np.einsum("mj,mjk->mk", found, vh[going])
         moved = np.abs(whole - before[going]).sum(axis=1)
         before[going] = whole
-        going = going[moved >= CLOSE]
+        going = going[moved >= LEAST_CHANGE]
         if going.size == 0:
             break
     return shrunk(slice(None)), alpha, lambda_

@@ -24,7 +24,7 @@ import pyarrow.parquet as pq
 from tirelib.core.errors import FormatError
 from tirelib.core.version import __version__
 from tirelib.fleet.sources import filesystem
-from tirelib.fleet.tables import PARTITION, SCHEMAS, SMALL
+from tirelib.fleet.tables import CLIENT_TABLES, PARTITION, SCHEMAS
 
 FORMAT = "tirelib-fleet/1"
 HEAD = "fleet.json"
@@ -222,7 +222,7 @@ class DataSet:
     def repair(self, task: str) -> None:
         """Remove the files of batches that were not written to their end."""
         whole = {_batch(path) for path in self._files("container_metrics")}
-        for name in SMALL:
+        for name in CLIENT_TABLES:
             if name == "container_metrics":
                 continue
             for path in self._files(name):
@@ -233,7 +233,7 @@ class DataSet:
         """Add the rows of a batch; return (table, path within it) of each file."""
         batch = uuid4().hex
         written = []
-        for name in SMALL:
+        for name in CLIENT_TABLES:
             if name != "container_metrics" and not rows.get(name):
                 continue
             table = pa.Table.from_pylist(list(rows.get(name, ())), schema=SCHEMAS[name])

@@ -23,7 +23,7 @@ FEWEST_SPREAD = 5
 LARGEST_SHARE = 0.3
 """Share of the values that may stand out. Each step tests at a part of the level: with half of it
 82 instead of 65 % of tires 5 scatters away are found among 12, with double 49 %."""
-MANY = 100
+LARGE_SAMPLE = 100
 """Values from which one of them no longer changes mean and scatter of the others."""
 FEWEST_IN_TIME = 5
 """Recordings over time from which a change is judged: two for the line, three for its scatter."""
@@ -83,7 +83,7 @@ def spread_of(values: FloatArray, stds: FloatArray, tests: int = 1) -> Spread:
     outlier = np.zeros(n, dtype=np.bool_)
     outlier[order[:last]] = True
     centre, scatter, _ = centre_of(values[~outlier], stds[~outlier])
-    if n > MANY:
+    if n > LARGE_SAMPLE:
         score = _scores(values, stds, values, stds, ~outlier)
     else:
         score = np.array([_own_score(i, values, stds, ~outlier) for i in range(n)])

@@ -110,5 +110,5 @@ SCHEMAS: dict[str, pa.Schema] = {
     ),
 }
 """Columns by table, in the order in which a batch of results is written."""
-SMALL = tuple(name for name in SCHEMAS if name != "channels")
+CLIENT_TABLES = tuple(name for name in SCHEMAS if name != "channels")
 """Tables that the client writes, a file for many containers; a worker writes the channels."""

@@ -26,7 +26,7 @@ from tirelib.model.solution import (
 )
 from tirelib.physics.rolling.assemble import Unknowns
 
-SMALL = 1e-4
+GAGE_STEP = 1e-4
 """Change of a waveform, over its largest value, by which a gage is differentiated. On a campaign of
 66 runs half and double of it change slopes by 5e-5 of themselves at most."""
 LINEAR_STEP = 1e-4
@@ -214,7 +214,7 @@ def _through_gage(found: Solution, rows: FloatArray) -> FloatArray:
     """Return small changes (k, n_points, n_phi) of the waveform as the gage shows them."""
     if not any(stage == "gage" for stage, _ in found.changes):
         return rows
-    size = SMALL * float(np.abs(found.shown).max())
+    size = GAGE_STEP * float(np.abs(found.shown).max())
     out = []
     for row in rows:
         step = size / max(float(np.abs(row).max()), 1e-300)

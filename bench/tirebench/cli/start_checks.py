@@ -33,7 +33,7 @@ _EXAMPLE = {
 }
 SAMPLES_PER_CYCLE = 2.0 / NYQUIST_SHARE
 """Samples in a cycle of the filter's cut-off, below which the FMU flags every turn `cut_off`."""
-ENOUGH = 2.0 * SAMPLES_PER_CYCLE
+LEAST_SAMPLES = 2.0 * SAMPLES_PER_CYCLE
 """Samples in a cycle with which a calibration of 10 kHz still knows its own tire: at 65 km/h (24
 cycles a turn) 59 of 60 turns of the rig are valid with 7.5, 60 with 9, 29 with 5.7 and 3 with 4.5;
 ``docs/reference/protocols.md`` has the table."""
@@ -69,7 +69,7 @@ def _beyond(given: Conditions, calibration: Calibration) -> Iterator[str]:
         )
 
 
-def least_rate(calibration: Calibration, speed: float, per_cycle: float = ENOUGH) -> float:
+def least_rate(calibration: Calibration, speed: float, per_cycle: float = LEAST_SAMPLES) -> float:
     """Return the sample rate [Hz] that a calibration needs at a speed [m/s]."""
     radius = _radius(calibration)
     turn_rate = abs(speed) / (2.0 * math.pi * radius)
@@ -97,9 +97,11 @@ def slow(calibration: Calibration, rate: float, speed: float) -> str:
     if not speed:
         if calibration.cut_off is not None:
             return ""
-        up_to = 3.6 * rate * turn / (ENOUGH * calibration.order)
+        up_to = 3.6 * rate * turn / (LEAST_SAMPLES * calibration.order)
         return f"note: {rate:g} Hz is enough for this calibration up to {up_to:.0f} km/h"
-    needed, impossible = (least_rate(calibration, speed, n) for n in (ENOUGH, SAMPLES_PER_CYCLE))
+    needed, impossible = (
+        least_rate(calibration, speed, n) for n in (LEAST_SAMPLES, SAMPLES_PER_CYCLE)
+    )
     if rate >= needed:
         return ""
     what = (

@@ -7,7 +7,7 @@ import pytest
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import BayesianRidge
 
-from tirelib.estimators.ridge import CLOSE, MOST_STEPS, ridge_fit, ridge_fits
+from tirelib.estimators.ridge import LEAST_CHANGE, MOST_STEPS, ridge_fit, ridge_fits
 
 N, K = 40, 12
 
@@ -23,7 +23,7 @@ def library(x: np.ndarray, y: np.ndarray, weights: np.ndarray, centre: bool) -> 
     """Fit with scikit-learn what is standardised by hand."""
     middle = np.average(y, weights=weights) if centre else 0.0
     spread = np.sqrt(np.average((y - middle) ** 2, weights=weights))
-    ridge = BayesianRidge(fit_intercept=False, max_iter=MOST_STEPS, tol=CLOSE)
+    ridge = BayesianRidge(fit_intercept=False, max_iter=MOST_STEPS, tol=LEAST_CHANGE)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         ridge.fit(

@@ -12,7 +12,7 @@ from tirelib.inference.identify.error_bands import levels
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.physics.brush.predict import PointParameters
 
-FEW = 150
+MOST_OWN_CELLS = 150
 """Up to so many points each is its own cell."""
 MOST_CELLS = 800
 _CAMBER = float(np.deg2rad(0.5))
@@ -152,7 +152,7 @@ def _bend(force: str, brush: PointParameters, data: ForceData) -> FloatArray:
 
 def cell_numbers(data: ForceData) -> IntArray:
     """Return the number of each point's cell, from 0; at most 800 cells."""
-    if len(data) <= FEW:
+    if len(data) <= MOST_OWN_CELLS:
         return np.arange(len(data))
     share = 1.0
     while True:

@@ -27,7 +27,7 @@ from tirelib.inference.identify.ring_patch import ring_half
 
 LOAD_RATIO = 1.1
 """Least ratio of the largest load to the smallest from which the power of the load is fitted."""
-LIMIT = 0.5
+MOST_STD = 0.5
 """Uncertainty up to which a parameter counts as identified, relative to its size."""
 _START_POINTS = 4000
 
@@ -257,6 +257,6 @@ def _status(name: str, value: float, spread: float, *, assumed: bool) -> str:
     if min(low, high) < room:
         return "at boundary"
     stiffness = name in ("lateral_stiffness", "longitudinal_stiffness")
-    if not spread <= LIMIT or (assumed and stiffness):
+    if not spread <= MOST_STD or (assumed and stiffness):
         return "not identifiable from this campaign"
     return "ok"

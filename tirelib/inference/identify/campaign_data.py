@@ -42,7 +42,7 @@ MIDDLE = 0.05
 """Half of the angle below the axle over which the sign of the strain is looked at, [rad]."""
 LEAST_DEFLECTIONS = 3
 """Measured deflections below which none takes part in a fit: zero, slope and one to check them."""
-FEW = 15
+FIRST_RUNS = 15
 """Runs with which a fit may begin: the others only make it more accurate. To diagnose two campaigns
 of 66 runs takes 87 and 194 s of CPU with it, 91 and 185 with half, 94 and 143 with double, 110 and
 176 with all of them, on a machine that others used as well; the verdicts are the same. On seven
@@ -55,10 +55,10 @@ GEOMETRY_ERROR = 1e-3
 
 def begins_with(count: int) -> BoolArray:
     """Return with which runs (count,) a fit begins: a quarter at random; all if they are few."""
-    if count < 2 * FEW:
+    if count < 2 * FIRST_RUNS:
         return np.ones(count, dtype=bool)
     chosen = np.zeros(count, dtype=bool)
-    chosen[np.random.default_rng(0).permutation(count)[: max(FEW, count // 4)]] = True
+    chosen[np.random.default_rng(0).permutation(count)[: max(FIRST_RUNS, count // 4)]] = True
     return chosen
 
 

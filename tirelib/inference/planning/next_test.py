@@ -31,7 +31,7 @@ ENDLESS = 1e6
 """Repeats that average everything that repeats can average."""
 PLAN_REPEATS = (1, 2, 3, 4, 6, 8, 12)
 """Times that the whole plan is measured."""
-MANY = 1e3
+MOST_REPEATS = 1e3
 """Repeats that stand for endless ones: the noise is far below the misfit of a run then, and normal
 equations of still less noise are not accurate."""
 
@@ -333,7 +333,7 @@ def gains(
     rivals = [rival for rival in test.rivals if rival.name != NOTHING]
     out: dict[str, dict[float, float]] = {rival.name: {} for rival in rivals}
     for times in (*PLAN_REPEATS, ENDLESS):
-        again = nothing.fit.view(problem.repeated(min(times, MANY)), nothing.null.view.own)
+        again = nothing.fit.view(problem.repeated(min(times, MOST_REPEATS)), nothing.null.view.own)
         null = nothing.null.about(again, nothing.null.size)
         for rival in rivals:
             scale = hypotheses.effects[rival.name].scale

@@ -25,7 +25,7 @@ from tirelib.report.style import BLUE, FAINT, INK, RED
 
 NAMES = {name: quantity.title for name, quantity in QUANTITIES.items()} | {"gage": "gage"}
 SIGN = "Red: the model shows too much tension (too little compression); blue: too much compression."
-FEW = 12
+MOST_NAMED_ROWS = 12
 """Rows of a map up to which the pointer names the row."""
 _SLIPS = {
     "slip_angle": (" deg slip angle", 0.25),
@@ -158,7 +158,7 @@ def _map(
 
 def _turns(data: FloatArray, labels: Sequence[str], unit: str, height: int) -> go.Figure:
     """Return a map whose rows the pointer names, where they are few."""
-    if len(labels) > FEW:
+    if len(labels) > MOST_NAMED_ROWS:
         return turn_map(data, unit, height)
     said = np.broadcast_to(np.array(labels, dtype=object)[:, None], data.shape)
     hover = "%{text}<br>%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>"
