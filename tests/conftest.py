@@ -4,6 +4,7 @@ import gc
 import os
 import sys
 from collections.abc import Callable, Generator, Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -37,14 +38,17 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_collection() -> Generator[None, object, object]:
+def pytest_collection(session: pytest.Session) -> Generator[None, object, object]:
     """Keep modules and tests, half a million objects that stay, out of the search for garbage.
 
-    A copy of this process (fork) would copy their memory, too, as soon as it searched them.
+    A copy of this process (fork) would copy their memory, too, as soon as it searched them. The
+    first process of a run compiles all modules, half of the work, and the others wait to read them.
     """
+    several = hasattr(session.config, "workerinput")
     gc.disable()
     try:
-        return (yield)
+        with once.first_alone("collection") if several else nullcontext():
+            return (yield)
     finally:
         gc.freeze()
         gc.enable()

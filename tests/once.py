@@ -6,7 +6,8 @@ import os
 import pickle
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
@@ -41,6 +42,18 @@ def once(name: str, fill: Callable[[Path], object]) -> Path:
             filled.touch()
             MADE.append(folder)
     return folder
+
+
+@contextmanager
+def first_alone(name: str) -> Iterator[None]:
+    """Let the first process that comes here go through alone, and all others together after it."""
+    share_a_folder()
+    with (Path(os.environ[PLACE]) / f"{name}.lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            fcntl.flock(lock, fcntl.LOCK_SH)
+        yield
 
 
 def value_once(name: str, make: Callable[[], Value]) -> Value:
