@@ -54,6 +54,8 @@ class Hypothesis:
     likelihood : float
         Largest log likelihood over the families and over how far the laws are off, laws that are
         exact among them, [nats].
+    further : mapping of name to float
+        Largest log likelihood with each further effect and exact laws, to first order, [nats].
     rival : str
         Effects of a hypothesis of as many effects that is likelier; empty where there is none.
     p_rival : float
@@ -70,6 +72,7 @@ class Hypothesis:
     looseness: float
     plausible: bool
     likelihood: float
+    further: Mapping[str, float]
     rival: str = ""
     p_rival: float = 1.0
     p_beside: float = 0.0
@@ -178,7 +181,7 @@ def judged(
         near = found[laws][1:]
         found |= {m: _likeliest(near, fit, families, m) for m in more if m not in found}
         laws = max(found, key=lambda laws: found[laws][0])
-    exact, _ = _likeliest(views, fit, families, _each(fit, 0.0))
+    exact = [_null(view, fit, f, _each(fit, 0.0)) for view in views for f in families]
     loosest = _each(fit, LOOSEST)
     likeliest = sorted(alike, key=lambda laws: -found[laws][0])
     looseness = np.inf
@@ -190,8 +193,9 @@ def judged(
         if stays:
             looseness = max((*each, LAWS[-1])) / LAWS[-1]
             break
-    likelihood = max(exact, found[laws][0])
-    return Hypothesis(fit, *kept, looseness, plausible(fit, own_effects), likelihood)
+    likelihood = max(found[laws][0], *(null.likelihood for null in exact))
+    further = {name: max(null.gained[name] for null in exact) for name in exact[0].gained}
+    return Hypothesis(fit, *kept, looseness, plausible(fit, own_effects), likelihood, further)
 
 
 def _vague(fit: Posterior) -> list[int]:

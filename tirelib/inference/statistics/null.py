@@ -135,8 +135,17 @@ class Null:
     @property
     def unnamed(self) -> float:
         """The likelihood with more of the group of shapes that gains most, if any, [nats]."""
-        gains = zip(self.names, 0.5 * self.counts * self._ratios[:, 0], strict=True)
-        return self.likelihood + max((float(g) for name, g in gains if "," in name), default=0.0)
+        gains = (each for name, each in self.gained.items() if "," in name)
+        return max(gains, default=self.likelihood)
+
+    @cached_property
+    def gained(self) -> dict[str, float]:
+        """The likelihood with each that may be there in addition to the hypothesis, [nats].
+
+        It is lower than without an effect that would have to be on the other side of its range.
+        """
+        gains = self.likelihood + 0.5 * self.counts * self._ratios[:, 0]
+        return dict(zip(self.names, gains.tolist(), strict=True))
 
     @property
     def likeliest(self) -> Weighed:

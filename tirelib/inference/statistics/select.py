@@ -124,6 +124,15 @@ def select(
         # a rival that is itself rejected is not there, but something like it may be
         fitted = [hypotheses.against(h, possible[0]) for h in possible]
         staying = [h for h in fitted if h.p > alpha]
+        if size < MOST:
+            larger = [
+                [((*hypotheses.added(h), n), h) for n in _further(h, hypotheses.effects, PARTNERS)]
+                for h in staying
+            ]
+            hypotheses.each([each for some in larger for each in some])
+            held = {h: hypotheses.against_larger(h) for h in staying}
+            fitted = [held.get(h, h) for h in fitted]
+            staying = [h for h in fitted if h.p > alpha]
         simpler = {h: hypotheses.simpler(h) for h in staying}
         members = [h for h in staying if simpler[h] is None]
         if members:
@@ -189,12 +198,14 @@ def _alike(hypotheses: Hypotheses, best: Hypothesis) -> list[Hypothesis]:
 def _further(leader: Hypothesis, effects: dict[str, Effect], most: int) -> list[str]:
     """Return the further effects that promise most beside a hypothesis, to first order, best first.
 
-    In turn the one that stands out most and the one that leaves least: where something stands out
-    that no effect explains to first order, all leave the same.
+    In turn the one that stands out most, the one that leaves least, and the likeliest with exact
+    laws: where something stands out that no effect explains to first order, all leave the same, and
+    where laws may be off, what they may be off by hides an effect.
     """
     names = [name for name in leader.null.names if name in effects]
     left, scores = leader.null.left(names), leader.scores
     standing = sorted(names, key=lambda name: -scores[name])
     least = sorted(names, key=lambda name: left[name])
-    turns = (name for pair in zip(standing, least, strict=True) for name in pair)
+    likeliest = sorted(names, key=lambda name: -leader.further[name])
+    turns = (name for each in zip(standing, least, likeliest, strict=True) for name in each)
     return list(dict.fromkeys(turns))[:most]
