@@ -107,33 +107,33 @@ class Hypotheses:
         """Return a hypothesis that is not rejected with its p-value against one effect more.
 
         The error that a law may have covers what a further effect does, so that nothing stands out
-        beside it. Where the law is exact and the effect is there as well, the runs are likelier.
-        Any of n effects may be the further one: a likelihood ratio of n / p in favour of one of
-        them has at most the probability p where none is there (Bonferroni, and Royall as in
+        beside it. If the law is exact and the effect is there as well, the runs are likelier. Any
+        of n effects may be the further one: a likelihood ratio of n / p in favour of one of them
+        has at most the probability p where none is there (Bonferroni, and Royall as in
         `tirelib.inference.statistics.rival`). Something without a name may stand beside the
         hypothesis, and an effect that is no larger than plain tires show is not there.
         """
-        names, had = set(hypothesis.names), len(self.had)
-        larger = [
+        rival = max(self._larger(hypothesis), key=lambda h: h.likelihood, default=hypothesis)
+        ratio = min(hypothesis.unnamed - rival.likelihood, 0.0)
+        p = (len(self.effects) - len(self.added(hypothesis))) * float(np.exp(ratio))
+        if hypothesis.p <= self.false_alarm or rival is hypothesis or p > self.false_alarm:
+            return hypothesis
+        out = replace(hypothesis, rival=" and ".join(self.added(rival)), p_rival=p)
+        self._made[frozenset(self.added(hypothesis))] = out
+        return out
+
+    def _larger(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Return those with one effect more that were fitted, if that effect is really there."""
+        names = set(hypothesis.names)
+        return [
             h
             for h in self.tried
             if h.plausible
             and len(h.names) == len(names) + 1
             and names < set(h.names)
-            and all(
-                h.p_plain(k) <= self.false_alarm
-                for k, name in enumerate(self.added(h), had)
-                if name not in names
-            )
+            and h.p_plain(next(k for k, name in enumerate(h.names) if name not in names))
+            <= self.false_alarm
         ]
-        rival = max(larger, key=lambda h: h.likelihood, default=hypothesis)
-        count = len(self.effects) - len(self.added(hypothesis))
-        p = count * np.exp(min(hypothesis.unnamed - rival.likelihood, 0.0))
-        if rival is hypothesis or p > self.false_alarm:
-            return hypothesis
-        out = replace(hypothesis, rival=" and ".join(self.added(rival)), p_rival=float(p))
-        self._made[frozenset(self.added(hypothesis))] = out
-        return out
 
     def without_plain(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """Return the hypothesis of those of its effects that are larger than plain tires show.

@@ -7,7 +7,8 @@ off than laws are. Its p-value is the rank of the largest standard score
 plan: for each family of tires by itself; the largest p over the families counts, so that a tire
 that is like any one of them is covered. A hypothesis is rejected as well where a rival of as many
 effects explains the runs much better (`tirelib.inference.statistics.rival`), whether the rival
-itself is rejected or not, and gives way to fewer of its effects that explain the runs as well
+itself is rejected or not, or where one effect more makes the runs much likelier
+(`Hypotheses.against_larger`), and gives way to fewer of its effects that explain the runs as well
 (`Hypotheses.simpler`). Every other hypothesis with p > alpha is in the set, without those of its
 effects that are no larger than plain tires show (`Hypothesis.p_plain`). Its smallest members are
 what the data say (Ferrari and Yang 2015): none in it, nothing is missing; one smallest member, that
@@ -123,16 +124,17 @@ def select(
         possible = [h for h in every if h.plausible]
         # a rival that is itself rejected is not there, but something like it may be
         fitted = [hypotheses.against(h, possible[0]) for h in possible]
-        staying = [h for h in fitted if h.p > alpha]
         if size < MOST:
-            larger = [
-                [((*hypotheses.added(h), n), h) for n in _further(h, hypotheses.effects, PARTNERS)]
-                for h in staying
-            ]
-            hypotheses.each([each for some in larger for each in some])
-            held = {h: hypotheses.against_larger(h) for h in staying}
-            fitted = [held.get(h, h) for h in fitted]
-            staying = [h for h in fitted if h.p > alpha]
+            hypotheses.each(
+                [
+                    ((*hypotheses.added(h), name), h)
+                    for h in fitted
+                    if h.p > alpha
+                    for name in _further(h, hypotheses.effects, PARTNERS)
+                ]
+            )
+            fitted = [hypotheses.against_larger(h) for h in fitted]
+        staying = [h for h in fitted if h.p > alpha]
         simpler = {h: hypotheses.simpler(h) for h in staying}
         members = [h for h in staying if simpler[h] is None]
         if members:

@@ -1,0 +1,94 @@
+"""A hypothesis whose law may cover a further effect gives way to both, if both are likelier."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.unit.inference.statistics.linear_problem import EFFECTS, N, Toy, by_effect, drawn, family
+from tirelib.core.arrays import FloatArray
+from tirelib.inference.statistics.hypotheses import Hypotheses
+from tirelib.inference.statistics.hypothesis import LAWS, Hypothesis
+from tirelib.inference.statistics.problem import Point
+from tirelib.inference.statistics.select import select
+
+FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
+LOUD = 30.0
+"""By how much the effects are louder than those of the other toys."""
+COVERED = 0.06
+"""Strength of an effect that the error of the twist's law may show, in ranges."""
+
+
+WAYS = 30
+"""In how many ways a law may be off."""
+
+
+class Loud(Toy):
+    """Effects far above the noise, whose laws may be off in many ways, as those of strain are."""
+
+    def __init__(self, measured: FloatArray) -> None:
+        super().__init__(measured)
+        self.by = {name: LOUD * rows for name, rows in self.by.items()}
+        self.ways = LOUD * np.random.default_rng(21).standard_normal((WAYS, N))
+
+    def roughly(
+        self, point: Point, solved: Any, slopes: FloatArray, count: int
+    ) -> list[FloatArray]:
+        each = by_effect(point, slopes, count)
+        return [np.linalg.norm(size) / np.sqrt(WAYS) * self.ways for _, size in each]
+
+
+def planted(seed: int, *, law: float = 0.0, **ranges: float) -> Loud:
+    """Return a tire with effects planted, the twist's law off by a relative deviation."""
+    random = np.random.default_rng(seed)
+    toy = Loud(drawn(random))
+    for name, strength in ranges.items():
+        toy.measured = toy.measured + strength * toy.by[name][0]
+    one = Point(toy.start.base, (EFFECTS["twist"],), (np.array([EFFECTS["twist"].scale]),))
+    (ways,) = toy.roughly(one, None, np.concatenate([toy.base, toy.by["twist"]]), 1)
+    toy.measured = toy.measured + law * random.standard_normal(WAYS) @ ways
+    return toy
+
+
+def test_an_effect_that_the_error_of_a_law_may_show_is_named_beside_an_exact_law() -> None:
+    found = select(planted(3, twist=1.0, bend=COVERED), FAMILIES)
+    assert set(found.sets) == {("twist", "bend")}
+    alone = found.hypotheses.at(["twist"])
+    assert alone is not None
+    # nothing stands out beside the one: the error of its law may look like the other
+    assert alone.p_of(alone.statistic)[0] > 0.05
+    assert set(alone.rival.split(" and ")) == {"twist", "bend"}
+    assert alone.p == alone.p_rival <= 0.05
+
+
+@pytest.mark.parametrize("law", [0.0, LAWS[0]])
+def test_a_true_hypothesis_seldom_gives_way_to_one_effect_more(law: float) -> None:
+    found = [select(planted(60 + seed, law=law, twist=1.0), FAMILIES).sets for seed in range(8)]
+    assert sum(each != (("twist",),) for each in found) <= 2  # upper 99 % bound of 5 % of 8
+
+
+def test_one_effect_more_is_not_there_if_plain_tires_show_as_much_of_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    among = Hypotheses(planted(3, twist=1.0, bend=COVERED), FAMILIES)
+    alone, both = among.at(["twist"]), among.at(["twist", "bend"])
+    assert alone is not None
+    assert both is not None
+    assert among.against_larger(alone).rival
+
+    def plain(self: Hypothesis, index: int) -> float:
+        return 1.0
+
+    monkeypatch.setattr(Hypothesis, "p_plain", plain)
+    assert among.against_larger(alone) is alone
+
+
+def test_one_effect_more_has_to_be_likelier_than_something_without_a_name() -> None:
+    among = Hypotheses(planted(3, twist=1.0, bend=COVERED), FAMILIES)
+    alone, both = among.at(["twist"]), among.at(["twist", "bend"])
+    assert alone is not None
+    assert both is not None
+    for gain, gives_way in ((0.0, False), (10.0, True)):
+        better: Any = alone.unnamed + gain
+        object.__setattr__(both, "likelihood", better)
+        assert bool(among.against_larger(alone).rival) is gives_way
