@@ -111,29 +111,25 @@ class Hypotheses:
         of n effects may be the further one: a likelihood ratio of n / p in favour of one of them
         has at most the probability p where none is there (Bonferroni, and Royall as in
         `tirelib.inference.statistics.rival`). Something without a name may stand beside the
-        hypothesis, and an effect that is no larger than plain tires show is not there.
+        hypothesis. Where the likeliest further effect is out of its range, or no larger than plain
+        tires show, it is something else that makes the runs likelier, and no effect is there.
         """
-        rival = max(self._larger(hypothesis), key=lambda h: h.likelihood, default=hypothesis)
+        rival = max(self._larger(hypothesis), key=lambda h: h.likelihood, default=None)
+        if hypothesis.p <= self.false_alarm or rival is None or not rival.plausible:
+            return hypothesis
+        further = next(k for k, name in enumerate(rival.names) if name not in hypothesis.names)
         ratio = min(hypothesis.unnamed - rival.likelihood, 0.0)
         p = (len(self.effects) - len(self.added(hypothesis))) * float(np.exp(ratio))
-        if hypothesis.p <= self.false_alarm or rival is hypothesis or p > self.false_alarm:
+        if max(p, rival.p_plain(further)) > self.false_alarm:
             return hypothesis
         out = replace(hypothesis, rival=" and ".join(self.added(rival)), p_rival=p)
         self._made[frozenset(self.added(hypothesis))] = out
         return out
 
     def _larger(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        """Return those with one effect more that were fitted, if that effect is really there."""
+        """Return the hypotheses of one effect more that were fitted."""
         names = set(hypothesis.names)
-        return [
-            h
-            for h in self.tried
-            if h.plausible
-            and len(h.names) == len(names) + 1
-            and names < set(h.names)
-            and h.p_plain(next(k for k, name in enumerate(h.names) if name not in names))
-            <= self.false_alarm
-        ]
+        return [h for h in self.tried if len(h.names) == len(names) + 1 and names < set(h.names)]
 
     def without_plain(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """Return the hypothesis of those of its effects that are larger than plain tires show.

@@ -181,7 +181,9 @@ def judged(
         near = found[laws][1:]
         found |= {m: _likeliest(near, fit, families, m) for m in more if m not in found}
         laws = max(found, key=lambda laws: found[laws][0])
-    exact = [_null(view, fit, f, _each(fit, 0.0)) for view in views for f in families]
+    without = _each(fit, 0.0)
+    exact, at = _likeliest(views, fit, families, without)
+    gained = [_null(at, fit, family, without).gained for family in families]
     loosest = _each(fit, LOOSEST)
     likeliest = sorted(alike, key=lambda laws: -found[laws][0])
     looseness = np.inf
@@ -193,8 +195,8 @@ def judged(
         if stays:
             looseness = max((*each, LAWS[-1])) / LAWS[-1]
             break
-    likelihood = max(found[laws][0], *(null.likelihood for null in exact))
-    further = {name: max(null.gained[name] for null in exact) for name in exact[0].gained}
+    likelihood = max(exact, found[laws][0])
+    further = {name: max(each[name] for each in gained) for name in gained[0]}
     return Hypothesis(fit, *kept, looseness, plausible(fit, own_effects), likelihood, further)
 
 

@@ -1,5 +1,6 @@
 """A hypothesis whose law may cover a further effect gives way to both, if both are likelier."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -89,6 +90,18 @@ def test_one_effect_more_has_to_be_likelier_than_something_without_a_name() -> N
     assert alone is not None
     assert both is not None
     for gain, gives_way in ((0.0, False), (10.0, True)):
-        better: Any = alone.unnamed + gain
-        object.__setattr__(both, "likelihood", better)
+        among._made[frozenset(both.names)] = replace(both, likelihood=alone.unnamed + gain)
         assert bool(among.against_larger(alone).rival) is gives_way
+
+
+def test_one_effect_more_is_not_there_if_one_out_of_its_range_is_likelier() -> None:
+    among = Hypotheses(planted(3, twist=1.0, bend=COVERED), FAMILIES)
+    alone, both, other = (
+        among.at(each) for each in (["twist"], ["twist", "bend"], ["twist", "swell"])
+    )
+    assert alone is not None
+    assert both is not None
+    assert other is not None
+    likelier = replace(other, likelihood=both.likelihood + 1.0, plausible=False)
+    among._made[frozenset(other.names)] = likelier
+    assert among.against_larger(alone) is alone
