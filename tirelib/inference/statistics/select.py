@@ -27,8 +27,9 @@ from tirelib.inference.statistics.hypothesis import Hypothesis
 from tirelib.inference.statistics.plain import Family
 from tirelib.inference.statistics.problem import Problem
 
-SINGLES, PARTNERS, LEADERS = 6, 3, 2
-"""Hypotheses that are fitted exactly: single effects, partners of each leader, and leaders."""
+SINGLES, PARTNERS, LEADERS, FURTHER = 6, 3, 2, 2
+"""Hypotheses that are fitted exactly: single effects, partners of each leader, leaders, and effects
+beside each hypothesis that stays."""
 MOST = 3
 """Effects of a hypothesis at most."""
 ALIKE = np.deg2rad(80.0)
@@ -130,7 +131,7 @@ def select(
                     ((*hypotheses.added(h), name), h)
                     for h in fitted
                     if h.p > alpha
-                    for name in _further(h, hypotheses.effects, PARTNERS)
+                    for name in _further(h, hypotheses.effects, FURTHER)
                 ]
             )
             fitted = [hypotheses.against_larger(h) for h in fitted]
@@ -200,14 +201,14 @@ def _alike(hypotheses: Hypotheses, best: Hypothesis) -> list[Hypothesis]:
 def _further(leader: Hypothesis, effects: dict[str, Effect], most: int) -> list[str]:
     """Return the further effects that promise most beside a hypothesis, to first order, best first.
 
-    In turn the one that stands out most, the one that leaves least, and the likeliest with exact
-    laws: where something stands out that no effect explains to first order, all leave the same, and
-    where laws may be off, what they may be off by hides an effect.
+    In turn the one that stands out most, the likeliest with exact laws, and the one that leaves
+    least: what laws may be off by hides an effect, and where something stands out that no effect
+    explains to first order, all leave the same.
     """
     names = [name for name in leader.null.names if name in effects]
     left, scores = leader.null.left(names), leader.scores
     standing = sorted(names, key=lambda name: -scores[name])
     least = sorted(names, key=lambda name: left[name])
     likeliest = sorted(names, key=lambda name: -leader.further[name])
-    turns = (name for each in zip(standing, least, likeliest, strict=True) for name in each)
+    turns = (name for each in zip(standing, likeliest, least, strict=True) for name in each)
     return list(dict.fromkeys(turns))[:most]

@@ -374,7 +374,7 @@ def test_effects_that_stand_out_are_tried_though_all_leave_the_same() -> None:
     effects: Any = dict.fromkeys("abcde")
     assert _further(leader, effects, 1) == ["e"]
     # one that the error of a law hides is the likeliest with an exact law
-    assert {"b", "e"} <= set(_further(leader, effects, 3))
+    assert _further(leader, effects, 2) == ["e", "b"]
     assert {"d", "b", "e"} <= set(_further(leader, effects, 4))
     assert set(_further(leader, effects, 9)) == set("abcde")
 
