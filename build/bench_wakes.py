@@ -10,7 +10,6 @@ that lie ready, so without a pause.
 """
 
 import argparse
-import pickle
 import sys
 import tempfile
 import time
@@ -27,7 +26,7 @@ from tirebench.estimator.estimation import WheelEstimation
 from tirebench.estimator.fmu_archive import read_fmu
 from tirebench.estimator.fmu_model import FmuFile, FmuModel
 from tirebench.estimator.wheels import Block
-from tirebench.live.estimator import rest
+from tirebench.live.estimator import rest, with_following
 from tirebench.live.exchange import FINISH, Address, Exchange, woken
 from tirebench.live.supervised import CONTEXT, orphaned, settled
 from tirebench.wire.conditions import Conditions
@@ -66,10 +65,13 @@ def work(does: int, said: str, rests: bool, file: FmuFile, address: Address, rat
         while does > WAITS and (message := queue.read()) is not None:
             blocks += 1
             if does >= UNPICKLES:
-                block: Block = pickle.loads(message)
-            if does >= PREPARES and estimation.take(block).turns and rests:
-                came = [came[1], 1e-9 * block.arrival]
-                length = came[1] - came[0]
+                block = Block.unpack(message)
+            if does >= PREPARES:
+                block, _ = with_following(block, block.content, queue)
+                blocks += max(0, len(block.parts) - 1)
+                if (turns := estimation.take(block).turns) and rests:
+                    came = [came[1], 1e-9 * turns[-1].arrival]
+                    length = came[1] - came[0]
             queue.take()
         if exchange.is_set(FINISH):
             break
@@ -103,7 +105,7 @@ def feed(exchange: Exchange, strain: FloatArray, rate: float, seconds: float, pa
             plain[:, 0],
             plain,
         )
-        exchange.samples[0].put(pickle.dumps(Block(0, time.monotonic_ns(), 0, samples), 5))
+        exchange.samples[0].put(Block(0, time.monotonic_ns(), 0, samples).pack())
         if pause:
             exchange.address.fresh[0].release()
             time.sleep(max(0.0, begin + (i + 1) / rate - time.monotonic()))

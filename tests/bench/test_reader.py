@@ -112,7 +112,7 @@ def test_wherever_a_reader_is_killed_samples_come_once_and_a_replay_gives_the_sa
         if read.event == RESUMED:
             wheels.interrupt()
         for block in wheels.push(read.data, read.arrival) if read.data else []:
-            blocks[block.wheel].append(pickle.dumps(block, 5))
+            blocks[block.wheel].append(block.pack())
     assert given == blocks
     assert all(given)
 
@@ -144,7 +144,7 @@ def test_a_read_that_ends_every_reader_is_left_alone() -> None:
 def test_samples_of_a_read_that_could_not_be_recorded_never_come_twice(killed_before: int) -> None:
     given, _ = read_until(killed_before, room=False)
     for messages in given:
-        places = [pickle.loads(message).content.start for message in messages]
+        places = [Block.unpack(message).content.start for message in messages]
         assert places == sorted(set(places))
 
 
@@ -162,7 +162,7 @@ def test_what_waits_too_long_is_recorded_and_a_replay_leaves_it_out_too(
         now[0] = read.arrival + round(seconds * 1e9)
         reader._pass_or_decode(read)
         reader.take(read)
-    given = [pickle.loads(message) for message in iter(exchange.samples[0].read, None)]
+    given = list(iter(exchange.samples[0].read, None))
     recorded: list[Read] = [pickle.loads(message) for message in iter(exchange.raw.read, None)]
     passed = [read for read in recorded if read.event in (PASSED, DECODED)]
     assert [(read.arrival // 10**9 - 10, read.event) for read in passed] == [
@@ -182,7 +182,7 @@ def test_what_waits_too_long_is_recorded_and_a_replay_leaves_it_out_too(
         chain = ReplayChain(link, wheels, estimation)
         while not chain.ended:
             chain.poll(Deadline.never())
-    assert [pickle.dumps(block) for block in blocks] == [pickle.dumps(block) for block in given]
+    assert [block.pack() for block in blocks] == given
     assert wheels.counts == reader.state.wheels.counts
     assert reader.state.passed == sum(map(len, [*WIRE[6:15], *WIRE[24:27]]))
     exchange.close()

@@ -6,7 +6,7 @@ condition changes, so that it changes at its sample, and at the end of a segment
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
@@ -203,8 +203,7 @@ class WheelChain:
         if content.reset or self._afresh:
             turns = self.finish()
             self._begin(content, block.first_us)
-        self._arrival = block.arrival
-        return turns + self._take(content)
+        return turns + self._take(content, block.parts or ((len(content.strain), block.arrival),))
 
     def jump(self, why: str) -> None:
         """Start again with the next samples; drop waiting samples and conditions from the bus."""
@@ -217,7 +216,7 @@ class WheelChain:
         if segment is None or not len(segment.waiting):
             return []
         segment.mark(segment.marks)
-        turn = self._step(segment, segment.waiting)
+        turn = self._step(segment, segment.waiting, marked=True)
         return [] if turn is None else [turn]
 
     def _begin(self, block: Samples, first_us: int) -> None:
@@ -239,25 +238,27 @@ class WheelChain:
             block.strain.shape[1],
         )
 
-    def _take(self, block: Samples) -> list[Turn]:
-        """Store samples and take as many steps as they fill."""
+    def _take(self, block: Samples, parts: Sequence[tuple[int, int]]) -> list[Turn]:
+        """Store samples and take as many steps as they fill, read by read."""
         segment = self._segment
         if segment is None or not len(block.strain):
             return []
+        before = len(segment.waiting)
         strain, marks = block.strain, np.empty((len(block.lost), segment.gages + 1), np.bool_)
         marks[:, :-1], marks[:, -1] = block.saturated, block.lost  # 600 times a second
-        if len(segment.waiting):
+        if before:
             strain = np.concatenate((segment.waiting, strain))
             marks = np.concatenate((segment.marks, marks))
         marked = bool(marks.any())
         turns, first = [], 0
-        while len(strain) - first >= (size := self._size(segment)):
-            if marked:
-                segment.mark(marks[first : first + size])
-            turn = self._step(segment, strain[first : first + size])
-            first += size
-            if turn is not None:
-                turns.append(turn)
+        for came, self._arrival in parts:
+            while before + came - first >= (size := self._size(segment)):
+                if marked:
+                    segment.mark(marks[first : first + size])
+                turn = self._step(segment, strain[first : first + size], marked)
+                first += size
+                if turn is not None:
+                    turns.append(turn)
         segment.waiting, segment.marks = strain[first:], marks[first:]
         return turns
 
@@ -272,8 +273,8 @@ class WheelChain:
         size = self._estimator.samples
         return size if left >= size else max(1, math.ceil(left))
 
-    def _step(self, segment: _Segment, strain: FloatArray) -> Turn | None:
-        valid = bool(strain[0, 0] == strain[0, 0]) or not np.isnan(strain).all()
+    def _step(self, segment: _Segment, strain: FloatArray, marked: bool) -> Turn | None:
+        valid = not (marked and np.isnan(strain).all())
         result = self._estimator.step(strain, segment.condition, valid)
         segment.stepped += len(strain)
         self.steps += 1

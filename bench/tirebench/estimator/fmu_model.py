@@ -237,6 +237,7 @@ class FmuModel:
         self._inputs = self._ports([*strain, *present])
         self._strain = self._inputs.values[: len(strain)]
         self._conditions = self._inputs.values[len(strain) :]
+        self._given: Condition | None = None  # what stands there
         self._turn = self._ports(["turn"])
         texts = [v for v in self._variables.values() if v.type == "String"]
         self._texts = [v for v in texts if v.causality == "output"]
@@ -299,8 +300,9 @@ class FmuModel:
         try:
             n = len(strain)
             self._strain[: strain.size] = strain.reshape(-1)
-            for place, index in enumerate(self._held):
-                self._conditions[place] = conditions[index]
+            if conditions is not self._given:
+                self._conditions[:] = [conditions[index] for index in self._held]
+                self._given = conditions
             self._inputs.set()
             if self._valid is not None and valid != self._frame_valid:
                 self._valid.values[0] = self._frame_valid = valid

@@ -62,12 +62,10 @@ class Levels:
         strain = np.concatenate(self._waiting)
         self._waiting, self._count = [], 0
         known = np.isfinite(strain)
-        missing = 1.0 - known.mean(axis=0)
-        whole = np.where(known.any(axis=0), strain, 0.0)
-        mean = np.nanmean(whole, axis=0)
-        low, high = np.nanmin(whole, axis=0), np.nanmax(whole, axis=0)
-        for row in (mean, low, high):
-            row[~known.any(axis=0)] = np.nan
+        count = known.sum(axis=0)
+        mean = np.where(known, strain, 0.0).sum(axis=0) / np.where(count, count, np.nan)
+        low, high = (pick.reduce(strain.T.copy(), axis=1) for pick in (np.fmin, np.fmax))
+        missing = 1.0 - count / len(strain)
         return [Level(self._wheel, len(strain) * samples.period, mean, low, high, missing)]
 
 

@@ -4,6 +4,7 @@ All of it can be pickled, so that a reader that is started again goes on where t
 """
 
 import math
+import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
@@ -44,12 +45,29 @@ class Block:
     first_us : int, [us]
         Device time of the wheel's very first sample.
     content : Samples or BusCondition
+    parts : tuple of (int, int)
+        Of samples that came in several reads: how many had come with each of them, and its arrival;
+        empty where one read brought them.
     """
 
     wheel: int
     arrival: int
     first_us: int
     content: Samples | BusCondition
+    parts: tuple[tuple[int, int], ...] = ()
+
+    def pack(self) -> bytes:
+        """Return the block as it goes to another process."""
+        content = self.content
+        packed = content.pack() if isinstance(content, Samples) else content
+        return pickle.dumps((self.wheel, self.arrival, self.first_us, packed), 5)
+
+    @classmethod
+    def unpack(cls, message: bytes) -> "Block":
+        """Return the block of which `pack` made a message."""
+        wheel, arrival, first_us, packed = pickle.loads(message)
+        content = Samples.unpack(packed) if isinstance(packed, tuple) else packed
+        return cls(wheel, arrival, first_us, content)
 
 
 class Wheel:

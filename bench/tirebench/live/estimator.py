@@ -10,6 +10,7 @@ from tirebench.estimator.estimation import News, WheelEstimation
 from tirebench.estimator.fmu_model import FmuFile, FmuModel
 from tirebench.estimator.wheels import Block
 from tirebench.live.exchange import FINISH, Address, Exchange, woken
+from tirebench.live.rings import ByteQueue
 from tirebench.live.supervised import orphaned, settled
 from tirebench.wire.conditions import Conditions
 from tirebench.wire.timeline import Samples
@@ -19,9 +20,9 @@ BACKLOG = 3.0
 CAUGHT_UP = 0.5
 """Only an estimator that was once up to date skips: after a start it may catch up first, [s]."""
 LOOK = 0.1
-RESTED = 0.9
+RESTED = 0.95
 """Share of a turn's length for which nothing is due after a turn: what comes in that time is taken
-together. An estimate of a wheel that turns up to a tenth faster than before waits for nothing;
+together. An estimate of a wheel that turns up to a twentieth faster than before waits for nothing;
 of another it may come later by `LOOK`."""
 FULL = 0.01
 """Wait for the run to take its news, [s]."""
@@ -121,7 +122,7 @@ class _Estimator:
         while not orphaned():
             message = self._queue.read()
             if message is not None:
-                self._take(pickle.loads(message))
+                self._take(Block.unpack(message))
                 self._queue.take()
             elif self._exchange.is_set(FINISH):
                 self._report(self._estimation.finish())
@@ -149,16 +150,17 @@ class _Estimator:
             self._left_out(block.wheel, self._expected, self._end_us, content)  # no room for them
         if content.reset:
             self._report(self._estimation.finish())  # before the FMU takes its time to start again
+        block, content = with_following(block, content, self._queue)
         start = Place(content.segment, content.start)
-        self._expected = Place(content.segment, content.start + len(content.strain))
+        self._expected = Place(content.segment, content.end)
         self._end_us = content.end_us
         try:
             news = self._estimation.take(block, live=not self._plan.every)
-        except FmuError:  # ends this process; the next one goes on behind these samples
+        except FmuError:  # ends this process; the next goes on behind what was taken together
             self._jump(Jump(block.wheel, start, self._expected, RESTARTED, len(content.strain)))
             raise
         if news.turns:
-            self._turn_came = 1e-9 * block.arrival
+            self._turn_came = 1e-9 * news.turns[-1].arrival
         self._report(news)
 
     def _too_late(self, age: float) -> bool:
@@ -171,7 +173,7 @@ class _Estimator:
         """Leave out what is late, up to samples that are not or are the last ones."""
         start, start_us, first = Place(content.segment, content.start), content.t_us, block
         while _age(block) > CAUGHT_UP and (message := self._queue.read()) is not None:
-            newer: Block = pickle.loads(message)
+            newer = Block.unpack(message)
             if isinstance(newer.content, Samples):
                 block, content = newer, newer.content
         if block is not first:
@@ -215,6 +217,25 @@ class _Estimator:
             if orphaned():
                 return
         self._exchange.address.news.release()
+
+
+def with_following(block: Block, content: Samples, queue: ByteQueue) -> tuple[Block, Samples]:
+    """Put samples together with those that wait and go on where they end, up to `LOOK`."""
+    packed, parts, end = [content.pack()], [(len(content.strain), block.arrival)], content.end
+    while (end - content.start) * content.period < LOOK:
+        cursor = queue.cursor
+        message = queue.read()
+        _, arrival, _, more = pickle.loads(message) if message else (0,) * 4
+        if not isinstance(more, tuple) or more[:3] != (content.segment, "", end):
+            queue.cursor = cursor  # it stays there
+            break
+        packed.append(more)
+        end += len(more[-2])  # a byte for each sample
+        parts.append((end - content.start, arrival))
+    if len(packed) > 1:
+        content = Samples.unpack(*packed)
+        block = Block(block.wheel, parts[-1][1], block.first_us, content, tuple(parts))
+    return block, content
 
 
 def rest(since: float, length: float) -> float:

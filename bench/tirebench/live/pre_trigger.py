@@ -5,6 +5,7 @@ from collections import deque
 from itertools import islice
 from typing import Any
 
+from tirebench.estimator.wheels import Block
 from tirebench.links import LOST
 from tirebench.live.exchange import Exchange
 
@@ -52,7 +53,7 @@ class PreTrigger:
             found.append((read.arrival, "read", message))
             lost = read.arrival if read.event == LOST else lost
         while (message := exchange.strain.read()) is not None:
-            found.append((pickle.loads(message).arrival, "block", message))
+            found.append((Block.unpack(message).arrival, "block", message))
         while (message := exchange.results.read()) is not None:
             found.append((pickle.loads(message)[1], "estimate", message))
         for queue in (exchange.raw, exchange.strain, exchange.results):
@@ -74,11 +75,12 @@ class PreTrigger:
             if recorder.waiting > most:
                 return
             self._written += 1
-            content = pickle.loads(message)
             if kind == "estimate":
-                recorder.estimate(*content)
+                recorder.estimate(*pickle.loads(message))
+            elif kind == "block":
+                recorder.block(Block.unpack(message))
             else:
-                getattr(recorder, kind)(content)
+                recorder.read(pickle.loads(message))
 
     def forget_written(self) -> None:
         """Forget what was written: it is on disk."""

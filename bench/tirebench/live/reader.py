@@ -303,7 +303,7 @@ class _Reader:
         if self._plan.estimated:
             blocks = state.wheels.agreeing(blocks)
         slots = {wheel: slot for slot, wheel in enumerate(state.wheels.heard)}
-        return [(slots[block.wheel], pickle.dumps(block, 5)) for block in blocks]
+        return [(slots[block.wheel], block.pack()) for block in blocks]
 
     def _record(self, read: Read) -> bool:
         """Put a read into the queue of the recorder; False if there is no room for it."""

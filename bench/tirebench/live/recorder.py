@@ -14,6 +14,7 @@ from typing import Any
 from uuid import uuid4
 
 from tirebench.errors import RecordingError
+from tirebench.estimator.wheels import Block
 from tirebench.links import LOST
 from tirebench.live.exchange import Address, Exchange
 from tirebench.live.pre_trigger import PreTrigger
@@ -210,7 +211,7 @@ class _Recorder:
                 self._flush()
         while recorder is not None and (message := exchange.strain.read()) is not None:
             busy = True
-            recorder.block(pickle.loads(message))
+            recorder.block(Block.unpack(message))
             if recorder.waiting > CHUNK_BYTES:
                 self._flush()
         while recorder is not None and (message := exchange.results.read()) is not None:

@@ -8,7 +8,6 @@ whatever follows must forget what came before. What comes again or late is dropp
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import zip_longest
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -73,6 +72,10 @@ def added(one: Sequence[int], two: Sequence[int]) -> list[int]:
     return [a + b for a, b in zip_longest(one, two, fillvalue=0)]
 
 
+PackedSamples = tuple[int, str, int, int, float, int, bytes, bytes, bytes]
+"""Segment, reset, start, t_us, period and number of gages of `Samples`; strain, lost, saturated."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
     """Samples that follow each other without a gap in time.
@@ -105,39 +108,39 @@ class Samples:
     saturated: BoolArray
 
     @property
+    def end(self) -> int:
+        """Number of the sample that follows, within the segment."""
+        return self.start + len(self.strain)
+
+    @property
     def end_us(self) -> int:
         """Device time of the sample that follows, [us]."""
         return self.t_us + round(1e6 * self.period * len(self.strain))
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Go from process to process as bytes, which takes a third of the time of arrays."""
-        head = (self.segment, self.reset, self.start, self.t_us, self.period)
-        arrays = (array.tobytes() for array in (self.strain, self.lost, self.saturated))
-        return _from_bytes, (*head, self.strain.shape[1], *arrays)
+    def pack(self) -> PackedSamples:
+        """Return numbers and bytes, which go to another process in a tenth of an object's time."""
+        head = (self.segment, self.reset, self.start, self.t_us, self.period, self.strain.shape[1])
+        arrays = (self.strain, self.lost, self.saturated)
+        return *head, *(array.tobytes() for array in arrays)
 
+    @classmethod
+    def unpack(cls, *packed: PackedSamples) -> "Samples":
+        """Return packed samples, of which each goes on where the one before ends, in one block.
 
-def _from_bytes(
-    segment: int,
-    reset: str,
-    start: int,
-    t_us: int,
-    period: float,
-    gages: int,
-    strain: bytes,
-    lost: bytes,
-    saturated: bytes,
-) -> Samples:
-    """Return samples of which `Samples.__reduce__` made bytes; their arrays are read-only."""
-    return Samples(
-        segment,
-        reset,
-        start,
-        t_us,
-        period,
-        np.frombuffer(strain).reshape(-1, gages),
-        np.frombuffer(lost, np.bool_),
-        np.frombuffer(saturated, np.bool_).reshape(-1, gages),
-    )
+        Its arrays are read-only.
+        """
+        segment, reset, start, t_us, period, gages, *_ = packed[0]
+        *_, strain, lost, saturated = zip(*packed, strict=True)
+        return cls(
+            segment,
+            reset,
+            start,
+            t_us,
+            period,
+            np.frombuffer(b"".join(strain)).reshape(-1, gages),
+            np.frombuffer(b"".join(lost), np.bool_),
+            np.frombuffer(b"".join(saturated), np.bool_).reshape(-1, gages),
+        )
 
 
 class Timeline:
