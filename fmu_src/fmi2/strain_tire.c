@@ -21,8 +21,10 @@ static void tell(const void *functions, const char *name, const char *text, int 
 
 static const Dialect FMI2 = {tell, "fmuGUID", "fmuResourceLocation", "Real", "Integer"};
 
-/* Whether references are of a type and can be got, or set. */
-static int allowed(Slave *s, const fmi2ValueReference r[], size_t n, char kind, int set) {
+/* Whether there are values for references, which are of a type and can be got, or set. */
+static int allowed(Slave *s, const fmi2ValueReference r[], const void *v, size_t n, char kind,
+                   int set) {
+    if (!slave_given(s, r, v, n)) return 0;
     for (size_t i = 0; i < n; i++)
         if (!slave_allowed(s, r[i], kind, set)) return 0;
     return 1;
@@ -88,14 +90,14 @@ FMI2_EXPORT fmi2Status fmi2CancelStep(fmi2Component c) {
 FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n,
                                    fmi2Real v[]) {
     Slave *s = c;
-    if (!s || !allowed(s, r, n, 'R', 0)) return fmi2Error;
+    if (!s || !allowed(s, r, v, n, 'R', 0)) return fmi2Error;
     slave_foresee(s);
     for (size_t i = 0; i < n; i++) v[i] = s->real[r[i]];
     return fmi2OK;
 }
 
 static fmi2Status get_whole(Slave *s, const fmi2ValueReference r[], size_t n, int v[], char kind) {
-    if (!s || !allowed(s, r, n, kind, 0)) return fmi2Error;
+    if (!s || !allowed(s, r, v, n, kind, 0)) return fmi2Error;
     slave_foresee(s);
     for (size_t i = 0; i < n; i++) v[i] = s->whole[r[i]];
     return fmi2OK;
@@ -103,7 +105,7 @@ static fmi2Status get_whole(Slave *s, const fmi2ValueReference r[], size_t n, in
 
 static fmi2Status set_whole(Slave *s, const fmi2ValueReference r[], size_t n, const int v[],
                             char kind) {
-    if (!s || !allowed(s, r, n, kind, 1)) return fmi2Error;
+    if (!s || !allowed(s, r, v, n, kind, 1)) return fmi2Error;
     for (size_t i = 0; i < n; i++) s->whole[r[i]] = kind == 'B' ? v[i] != 0 : v[i];
     return fmi2OK;
 }
@@ -121,7 +123,7 @@ FMI2_EXPORT fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference 
 FMI2_EXPORT fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference r[], size_t n,
                                      fmi2String v[]) {
     Slave *s = c;
-    if (!s || !allowed(s, r, n, 'S', 0)) return fmi2Error;
+    if (!s || !allowed(s, r, v, n, 'S', 0)) return fmi2Error;
     slave_foresee(s);
     for (size_t i = 0; i < n; i++) v[i] = slave_text(s, r[i]);
     return fmi2OK;
@@ -130,7 +132,7 @@ FMI2_EXPORT fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference r
 FMI2_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], size_t n,
                                    const fmi2Real v[]) {
     Slave *s = c;
-    if (!s || !allowed(s, r, n, 'R', 1)) return fmi2Error;
+    if (!s || !allowed(s, r, v, n, 'R', 1)) return fmi2Error;
     for (size_t i = 0; i < n; i++) s->real[r[i]] = v[i];
     return fmi2OK;
 }
@@ -148,7 +150,7 @@ FMI2_EXPORT fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference 
 FMI2_EXPORT fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference r[], size_t n,
                                      const fmi2String v[]) {
     Slave *s = c;
-    if (!s || !allowed(s, r, n, 'S', 1)) return fmi2Error;
+    if (!s || !allowed(s, r, v, n, 'S', 1)) return fmi2Error;
     for (size_t i = 0; i < n; i++)
         if (slave_set_text(s, r[i], v[i])) return fmi2Error;
     return fmi2OK;
@@ -183,7 +185,7 @@ FMI2_EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate 
 FMI2_EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte b[],
                                              size_t n) {
     const SlaveState *kept = state;
-    if (!c || !kept) return fmi2Error;
+    if (!c || !kept || !b) return fmi2Error;
     if (n < kept->n)
         return (fmi2Status)slave_failed(c, "the state needs %lu bytes", (unsigned long)kept->n);
     memcpy(b, kept->bytes, kept->n);
@@ -240,7 +242,7 @@ FMI2_EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKin
 
 FMI2_EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind,
                                             fmi2Boolean *v) {
-    if (!c) return fmi2Error;
+    if (!c || !v) return fmi2Error;
     if (kind != fmi2Terminated) return fmi2Discard;
     *v = 0;
     return fmi2OK;

@@ -123,7 +123,7 @@ FMI3_EXPORT fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 now, fmi3Fl
                                   fmi3Boolean *early, fmi3Float64 *reached) {
     Instance *c = instance;
     (void)kept;
-    if (!c) return fmi3Error;
+    if (!c || !event || !end || !early || !reached) return fmi3Error;
     *event = *end = *early = false;
     *reached = now;
     if (c->event_mode)
@@ -163,7 +163,7 @@ FMI3_EXPORT fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boole
                                                 fmi3Float64 *next) {
     Instance *c = instance;
     (void)next;
-    if (!c) return fmi3Error;
+    if (!c || !again || !end || !nominals || !values || !defined) return fmi3Error;
     *again = *end = *nominals = *values = *defined = false;
     c->slave->announced = slave_turn(c->slave); /* the clock has ticked */
     return fmi3OK;
@@ -172,7 +172,7 @@ FMI3_EXPORT fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boole
 FMI3_EXPORT fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                     fmi3Clock v[]) {
     Instance *c = instance;
-    if (!c) return fmi3Error;
+    if (!c || !slave_given(c->slave, r, v, n)) return fmi3Error;
     for (size_t i = 0; i < n; i++) {
         if (r[i] != c->slave->count)
             return (fmi3Status)slave_failed(c->slave,
@@ -195,9 +195,10 @@ static size_t span(const Slave *s, fmi3ValueReference r) {
 }
 
 /* Whether references are of a type and have so many values together. */
-static int allowed(Slave *s, const fmi3ValueReference r[], size_t n, size_t values, char kind,
-                   int set) {
+static int allowed(Slave *s, const fmi3ValueReference r[], size_t n, const void *v, size_t values,
+                   char kind, int set) {
     size_t sum = 0;
+    if (!slave_given(s, r, v, n)) return 0;
     for (size_t i = 0; i < n; i++) {
         size_t own = r[i] < s->count ? span(s, r[i]) : 1;
         if (!own) {
@@ -221,11 +222,11 @@ FMI3_EXPORT fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueRefe
     Instance *c = instance;
     if (!c) return fmi3Error;
     Slave *s = c->slave;
-    if (n == 1 && values == 1 && r[0] == s->count + 1) {
+    if (n == 1 && values == 1 && r && v && r[0] == s->count + 1) {
         v[0] = s->time;
         return fmi3OK;
     }
-    if (!allowed(s, r, n, values, 'R', 0)) return fmi3Error;
+    if (!allowed(s, r, n, v, values, 'R', 0)) return fmi3Error;
     slave_foresee(s);
     for (size_t i = 0; i < n; v += span(s, r[i++]))
         memcpy(v, s->real + r[i], span(s, r[i]) * sizeof *v);
@@ -235,7 +236,7 @@ FMI3_EXPORT fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueRefe
 FMI3_EXPORT fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                       const fmi3Float64 v[], size_t values) {
     Instance *c = instance;
-    if (!c || !allowed(c->slave, r, n, values, 'R', 1)) return fmi3Error;
+    if (!c || !allowed(c->slave, r, n, v, values, 'R', 1)) return fmi3Error;
     for (size_t i = 0; i < n; v += span(c->slave, r[i++]))
         memcpy(c->slave->real + r[i], v, span(c->slave, r[i]) * sizeof *v);
     return fmi3OK;
@@ -244,7 +245,7 @@ FMI3_EXPORT fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueRefe
 FMI3_EXPORT fmi3Status fmi3GetInt32(fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                     fmi3Int32 v[], size_t values) {
     Instance *c = instance;
-    if (!c || !allowed(c->slave, r, n, values, 'I', 0)) return fmi3Error;
+    if (!c || !allowed(c->slave, r, n, v, values, 'I', 0)) return fmi3Error;
     for (size_t i = 0; i < n; i++) v[i] = c->slave->whole[r[i]];
     return fmi3OK;
 }
@@ -252,7 +253,7 @@ FMI3_EXPORT fmi3Status fmi3GetInt32(fmi3Instance instance, const fmi3ValueRefere
 FMI3_EXPORT fmi3Status fmi3SetInt32(fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                     const fmi3Int32 v[], size_t values) {
     Instance *c = instance;
-    if (!c || !allowed(c->slave, r, n, values, 'I', 1)) return fmi3Error;
+    if (!c || !allowed(c->slave, r, n, v, values, 'I', 1)) return fmi3Error;
     for (size_t i = 0; i < n; i++) c->slave->whole[r[i]] = v[i];
     return fmi3OK;
 }
@@ -260,7 +261,7 @@ FMI3_EXPORT fmi3Status fmi3SetInt32(fmi3Instance instance, const fmi3ValueRefere
 FMI3_EXPORT fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                       fmi3Boolean v[], size_t values) {
     Instance *c = instance;
-    if (!c || !allowed(c->slave, r, n, values, 'B', 0)) return fmi3Error;
+    if (!c || !allowed(c->slave, r, n, v, values, 'B', 0)) return fmi3Error;
     for (size_t i = 0; i < n; i++) v[i] = c->slave->whole[r[i]] != 0;
     return fmi3OK;
 }
@@ -268,7 +269,7 @@ FMI3_EXPORT fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueRefe
 FMI3_EXPORT fmi3Status fmi3SetBoolean(fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                       const fmi3Boolean v[], size_t values) {
     Instance *c = instance;
-    if (!c || !allowed(c->slave, r, n, values, 'B', 1)) return fmi3Error;
+    if (!c || !allowed(c->slave, r, n, v, values, 'B', 1)) return fmi3Error;
     for (size_t i = 0; i < n; i++) c->slave->whole[r[i]] = v[i];
     return fmi3OK;
 }
@@ -276,7 +277,7 @@ FMI3_EXPORT fmi3Status fmi3SetBoolean(fmi3Instance instance, const fmi3ValueRefe
 FMI3_EXPORT fmi3Status fmi3GetString(fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                      fmi3String v[], size_t values) {
     Instance *c = instance;
-    if (!c || !allowed(c->slave, r, n, values, 'S', 0)) return fmi3Error;
+    if (!c || !allowed(c->slave, r, n, v, values, 'S', 0)) return fmi3Error;
     for (size_t i = 0; i < n; i++) v[i] = slave_text(c->slave, r[i]);
     return fmi3OK;
 }
@@ -284,7 +285,7 @@ FMI3_EXPORT fmi3Status fmi3GetString(fmi3Instance instance, const fmi3ValueRefer
 FMI3_EXPORT fmi3Status fmi3SetString(fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                      const fmi3String v[], size_t values) {
     Instance *c = instance;
-    if (!c || !allowed(c->slave, r, n, values, 'S', 1)) return fmi3Error;
+    if (!c || !allowed(c->slave, r, n, v, values, 'S', 1)) return fmi3Error;
     for (size_t i = 0; i < n; i++)
         if (slave_set_text(c->slave, r[i], v[i])) return fmi3Error;
     return fmi3OK;
@@ -324,7 +325,7 @@ FMI3_EXPORT fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState
                                              fmi3Byte b[], size_t n) {
     Instance *c = instance;
     const SlaveState *kept = state;
-    if (!c || !kept) return fmi3Error;
+    if (!c || !kept || !b) return fmi3Error;
     if (n < kept->n)
         return (fmi3Status)slave_failed(c->slave, "the state needs %lu bytes",
                                         (unsigned long)kept->n);

@@ -34,6 +34,13 @@ int slave_allowed(Slave *s, unsigned r, char kind, int set) {
     return 1;
 }
 
+int slave_given(Slave *s, const void *references, const void *values, size_t n) {
+    if (!n || (references && values)) return 1;
+    slave_failed(s, "a null pointer; %lu value references and their values are needed",
+                 (unsigned long)n);
+    return 0;
+}
+
 /* Add a word to the status, by semicolons. */
 void slave_add(Slave *s, const char *word) {
     size_t n = strlen(s->status);

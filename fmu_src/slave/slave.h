@@ -119,6 +119,9 @@ int slave_step(Slave *s, double step);
  * parameter. */
 int slave_allowed(Slave *s, unsigned reference, char kind, int set);
 
+/* Whether the importer gave memory for n references and their values. */
+int slave_given(Slave *s, const void *references, const void *values, size_t n);
+
 /* Show, before a start, what a start would show. */
 void slave_foresee(Slave *s);
 

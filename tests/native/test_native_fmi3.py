@@ -4,7 +4,9 @@ import itertools
 import math
 import subprocess
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from ctypes import c_bool, c_char_p, c_double, c_int32, c_uint
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Xml
@@ -368,6 +370,34 @@ def test_what_cannot_be_done_is_an_error_and_the_instance_lives(fmus: dict[int, 
     slave.terminate()
     with pytest.raises(FMICallException):
         host.step(*frame)
+
+
+def test_a_null_pointer_is_an_error_and_not_the_end_of_the_importer(fmus: dict[int, Path]) -> None:
+    host = Host3(fmus[3], events=True).start()
+    slave, some = host.slave, (c_uint * 1)(*host.at("speed"))
+    state = slave.getFMUState()
+    no = (None,) * 5
+    calls: list[Callable[[], int]] = [
+        lambda: slave.fmi3SerializeFMUState(slave.component, state, None, 10**8),
+        lambda: slave.fmi3UpdateDiscreteStates(slave.component, *no, None),
+        lambda: slave.fmi3GetClock(slave.component, None, 1, (c_bool * 1)()),
+        lambda: slave.fmi3GetClock(slave.component, some, 1, None),
+    ]
+    for kind, number in (("Float64", c_double), ("Int32", c_int32), ("Boolean", c_bool)):
+        for call in (getattr(slave, f"fmi3{do}{kind}") for do in ("Get", "Set")):
+            calls.append(partial(call, slave.component, None, 1, (number * 1)(), 1))
+            calls.append(partial(call, slave.component, some, 1, None, 1))
+    for call in (slave.fmi3GetString, slave.fmi3SetString):
+        calls.append(partial(call, slave.component, None, 1, (c_char_p * 1)(b""), 1))
+        calls.append(partial(call, slave.component, some, 1, None, 1))
+    for act in calls:
+        with pytest.raises(FMICallException):
+            act()
+    assert host.said[0].startswith("a null pointer; 1 value references")
+    slave.enterStepMode()
+    with pytest.raises(FMICallException):
+        slave.fmi3DoStep(slave.component, 0.0, STEP, True, None, None, None, None)
+    host.step(*frames()[0])
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,9 @@ import math
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
+from ctypes import c_char_p, c_double, c_int, c_uint
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -257,6 +260,29 @@ def test_what_cannot_be_done_is_an_error_and_the_instance_lives(folder: Path) ->
     host.slave.terminate()
     with pytest.raises(FMICallException):
         host.step(*frame)
+
+
+def test_a_null_pointer_is_an_error_and_not_the_end_of_the_importer(folder: Path) -> None:
+    host = Host(folder).start()
+    slave, some = host.slave, (c_uint * 1)(host.at["speed"])
+    state = slave.getFMUstate()
+    calls: list[Callable[[], int]] = [
+        lambda: slave.fmi2SerializeFMUstate(slave.component, state, None, 10**8),
+        lambda: slave.fmi2GetBooleanStatus(slave.component, 3, None),
+    ]
+    for kind, number in (("Real", c_double), ("Integer", c_int), ("Boolean", c_int)):
+        for call in (getattr(slave, f"fmi2{do}{kind}") for do in ("Get", "Set")):
+            calls.append(partial(call, slave.component, None, 1, (number * 1)()))
+            calls.append(partial(call, slave.component, some, 1, None))
+    for call in (slave.fmi2GetString, slave.fmi2SetString):
+        calls.append(partial(call, slave.component, None, 1, (c_char_p * 1)(b"")))
+        calls.append(partial(call, slave.component, some, 1, None))
+    for act in calls:
+        with pytest.raises(FMICallException):
+            act()
+    assert host.said[0].startswith("a null pointer; 1 value references")
+    assert len(host.said) == 2  # the 10th time as well
+    host.step(*frames()[0])
 
 
 @pytest.mark.parametrize(
