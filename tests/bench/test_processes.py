@@ -31,7 +31,7 @@ from tirebench.estimator.wheels import Block, Wheels
 from tirebench.links import BACK, LOST, RESUMED, Read
 from tirebench.links.opening import PortPlan
 from tirebench.live.chain import LiveChain
-from tirebench.live.estimator import LOOK, EstimatorPlan, Report, _Estimator, rest
+from tirebench.live.estimator import LONGEST_REST, EstimatorPlan, Report, _Estimator, rest
 from tirebench.live.exchange import Address, Exchange
 from tirebench.live.live_plan import LivePlan
 from tirebench.live.reader import ReaderPlan, load
@@ -234,12 +234,12 @@ def test_a_cable_in_and_out_is_told_and_every_time_it_comes_back(
 
 @pytest.mark.parametrize(
     ("since", "length", "wanted"),
-    [(0.01, 0.1, 0.085), (0.096, 0.1, 0.0), (0.2, 0.1, 0.0), (0.0, 3.0, LOOK)],
+    [(0.01, 0.1, 0.088), (0.099, 0.1, 0.0), (0.2, 0.1, 0.0), (0.0, 3.0, LONGEST_REST)],
 )
 def test_an_estimator_rests_until_a_turn_may_be_due(
     since: float, length: float, wanted: float
 ) -> None:
-    """A turn that is a twentieth shorter than the last one is taken at once."""
+    """A turn that is a fiftieth shorter than the last one is taken at once."""
     assert rest(since, length) == pytest.approx(wanted)
 
 

@@ -20,10 +20,13 @@ BACKLOG = 3.0
 CAUGHT_UP = 0.5
 """Only an estimator that was once up to date skips: after a start it may catch up first, [s]."""
 LOOK = 0.1
-RESTED = 0.95
+"""Longest wait for samples before a process looks whether the run goes on, and how much of them it
+takes together, [s]."""
+RESTED = 0.98
 """Share of a turn's length for which nothing is due after a turn: what comes in that time is taken
-together. An estimate of a wheel that turns up to a twentieth faster than before waits for nothing;
-of another it may come later by `LOOK`."""
+together. An estimate of a wheel that turns up to a fiftieth faster than before waits for nothing;
+of another it may come later by `LONGEST_REST`."""
+LONGEST_REST = 0.2  # [s]
 FULL = 0.01
 """Wait for the run to take its news, [s]."""
 
@@ -249,7 +252,7 @@ def rest(since: float, length: float) -> float:
         Length of that turn; NaN where it is not known.
     """
     left = RESTED * length - since
-    return min(left, LOOK) if left > 0.0 else 0.0
+    return min(left, LONGEST_REST) if left > 0.0 else 0.0
 
 
 def _age(block: Block) -> float:
