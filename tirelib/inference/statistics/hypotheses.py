@@ -107,18 +107,18 @@ class Hypotheses:
         """Return a hypothesis that is not rejected with its p-value against one effect more.
 
         The error that a law may have covers what a further effect does, so that nothing stands out
-        beside it. If the law is exact and the effect is there as well, the runs are likelier. Any
+        beside it. If the laws are exact and the effect is there as well, the runs are likelier. Any
         of n effects may be the further one: a likelihood ratio of n / p in favour of one of them
         has at most the probability p where none is there (Bonferroni, and Royall as in
         `tirelib.inference.statistics.rival`). Something without a name may stand beside the
         hypothesis. Where the likeliest further effect is out of its range, or no larger than plain
         tires show, it is something else that makes the runs likelier, and no effect is there.
         """
-        rival = max(self._larger(hypothesis), key=lambda h: h.likelihood, default=None)
+        rival = max(self._larger(hypothesis), key=lambda h: h.exact, default=None)
         if hypothesis.p <= self.false_alarm or rival is None or not rival.plausible:
             return hypothesis
         further = next(k for k, name in enumerate(rival.names) if name not in hypothesis.names)
-        ratio = min(hypothesis.unnamed - rival.likelihood, 0.0)
+        ratio = min(hypothesis.unnamed - rival.exact, 0.0)
         p = (len(self.effects) - len(self.added(hypothesis))) * float(np.exp(ratio))
         if max(p, rival.p_plain(further)) > self.false_alarm:
             return hypothesis

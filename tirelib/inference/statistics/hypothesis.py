@@ -54,8 +54,10 @@ class Hypothesis:
     likelihood : float
         Largest log likelihood over the families and over how far the laws are off, laws that are
         exact among them, [nats].
+    exact : float
+        Largest log likelihood with exact laws, [nats].
     further : mapping of name to float
-        Largest log likelihood with each further effect and exact laws, to first order, [nats].
+        The same with each further effect, to first order, [nats].
     rival : str
         Effects of a hypothesis of as many effects that is likelier; empty where there is none.
     p_rival : float
@@ -72,6 +74,7 @@ class Hypothesis:
     looseness: float
     plausible: bool
     likelihood: float
+    exact: float
     further: Mapping[str, float]
     rival: str = ""
     p_rival: float = 1.0
@@ -197,7 +200,8 @@ def judged(
             break
     likelihood = max(exact, found[laws][0])
     further = {name: max(each[name] for each in gained) for name in gained[0]}
-    return Hypothesis(fit, *kept, looseness, plausible(fit, own_effects), likelihood, further)
+    inside = plausible(fit, own_effects)
+    return Hypothesis(fit, *kept, looseness, inside, likelihood, exact, further)
 
 
 def _vague(fit: Posterior) -> list[int]:

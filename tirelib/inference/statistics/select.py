@@ -30,9 +30,9 @@ from tirelib.inference.statistics.problem import Problem
 SINGLES, PARTNERS, LEADERS, FURTHER = 6, 3, 2, 2
 """Hypotheses that are fitted exactly: single effects, partners of each leader, leaders, and effects
 beside each hypothesis that stays."""
-MOST = 3
+MOST_EFFECTS = 3
 """Effects of a hypothesis at most."""
-ALIKE = np.deg2rad(80.0)
+LOOKALIKE_ANGLE = np.deg2rad(80.0)
 """Angle between signatures below which one effect is tried in the place of another: it says what is
 tried, and not what is told."""
 
@@ -90,9 +90,9 @@ def select(
     problem, families, false_alarm, progress
         As of `Hypotheses`, whose errors are raised.
     many : bool
-        Whether more effects than `MOST` may act at once. Where every hypothesis is rejected, even
-        with laws that are off by as much as themselves, the effect that stands out most is added
-        to the likeliest until one remains.
+        Whether more effects than `MOST_EFFECTS` may act at once. Where every hypothesis is
+        rejected, even with laws that are off by as much as themselves, the effect that stands out
+        most is added to the likeliest until one remains.
     """
     hypotheses = Hypotheses(problem, families, false_alarm, progress)
     base, alpha = hypotheses.base, false_alarm
@@ -106,7 +106,7 @@ def select(
     leaders: list[Hypothesis] = [base]
     # what an effect that states a start does at zero says nothing of what it does there
     elsewhere = [name for name, effect in hypotheses.effects.items() if effect.start]
-    for size in range(1, MOST + 1):
+    for size in range(1, MOST_EFFECTS + 1):
         tried = [
             (leader, _further(leader, hypotheses.effects, SINGLES if size == 1 else PARTNERS))
             for leader in leaders
@@ -125,7 +125,7 @@ def select(
         possible = [h for h in every if h.plausible]
         # a rival that is itself rejected is not there, but something like it may be
         fitted = [hypotheses.against(h, possible[0]) for h in possible]
-        if size < MOST:
+        if size < MOST_EFFECTS:
             hypotheses.each(
                 [
                     ((*hypotheses.added(h), name), h)
@@ -163,7 +163,7 @@ def _with_loose_laws(hypotheses: Hypotheses) -> Hypothesis | None:
 
     It is the likeliest such of its size; one that is out of its range is not told.
     """
-    for size in range(1, MOST + 1):
+    for size in range(1, MOST_EFFECTS + 1):
         same = [h for h in hypotheses.tried if len(hypotheses.added(h)) == size]
         loose = [h for h in same if 1.0 < h.looseness < np.inf]
         best = max(loose, key=lambda h: h.likelihood, default=None)
@@ -192,7 +192,7 @@ def _alike(hypotheses: Hypotheses, best: Hypothesis) -> list[Hypothesis]:
         (tuple(other if each == name else each for each in names), best)
         for name in names
         for other in hypotheses.effects
-        if other not in names and null.angle(name, other) < ALIKE
+        if other not in names and null.angle(name, other) < LOOKALIKE_ANGLE
     ]
     found = [h for h in dict.fromkeys(hypotheses.each(wanted)) if h is not None and h.plausible]
     return sorted((h for h in found if h.looseness <= best.looseness), key=lambda h: -h.likelihood)

@@ -90,7 +90,7 @@ def test_one_effect_more_has_to_be_likelier_than_something_without_a_name() -> N
     assert alone is not None
     assert both is not None
     for gain, gives_way in ((0.0, False), (10.0, True)):
-        among._made[frozenset(both.names)] = replace(both, likelihood=alone.unnamed + gain)
+        among._made[frozenset(both.names)] = replace(both, exact=alone.unnamed + gain)
         assert bool(among.against_larger(alone).rival) is gives_way
 
 
@@ -102,6 +102,6 @@ def test_one_effect_more_is_not_there_if_one_out_of_its_range_is_likelier() -> N
     assert alone is not None
     assert both is not None
     assert other is not None
-    likelier = replace(other, likelihood=both.likelihood + 1.0, plausible=False)
+    likelier = replace(other, exact=both.exact + 1.0, plausible=False)
     among._made[frozenset(other.names)] = likelier
     assert among.against_larger(alone) is alone
