@@ -31,7 +31,7 @@ from tirebench.estimator.wheels import Block, Wheels
 from tirebench.links import BACK, LOST, RESUMED, Read
 from tirebench.links.opening import PortPlan
 from tirebench.live.chain import LiveChain
-from tirebench.live.estimator import LONGEST_REST, EstimatorPlan, Report, _Estimator, rest
+from tirebench.live.estimator import LONGEST_REST, EstimatorPlan, Report, _Estimator, on_time, rest
 from tirebench.live.exchange import Address, Exchange
 from tirebench.live.live_plan import LivePlan
 from tirebench.live.reader import ReaderPlan, load
@@ -241,6 +241,18 @@ def test_an_estimator_rests_until_a_turn_may_be_due(
 ) -> None:
     """A turn that is a fiftieth shorter than the last one is taken at once."""
     assert rest(since, length) == pytest.approx(wanted)
+
+
+def test_a_turn_whose_bytes_come_late_does_not_delay_the_next_rest() -> None:
+    """Every third read is 12 ms late, the wheel's clock 100 ppm off; then the clock jumps."""
+    length, came = 0.1, float("nan")
+    for turn in range(60):
+        true = 5.0 + turn * length * (1.0 + 1e-4)
+        came = on_time(true + (0.012 if turn % 3 == 2 else 0.0), came, length)
+        assert abs(came - true) < 2.5e-4
+    assert on_time(50.0, came, length) == 50.0
+    assert on_time(6.0, came, length) == 6.0
+    assert on_time(60.0, 50.0, float("nan")) == 60.0
 
 
 def test_an_estimator_that_knows_no_turn_does_not_rest() -> None:

@@ -27,6 +27,8 @@ RESTED = 0.98
 together. An estimate of a wheel that turns up to a fiftieth faster than before waits for nothing;
 of another it may come later by `LONGEST_REST`."""
 LONGEST_REST = 0.2  # [s]
+CLOCKS_APART = 1e-3
+"""Largest relative difference of the clocks of wheel and host: ten times that of two quartzes."""
 FULL = 0.01
 """Wait for the run to take its news, [s]."""
 
@@ -162,8 +164,6 @@ class _Estimator:
         except FmuError:  # ends this process; the next goes on behind what was taken together
             self._jump(Jump(block.wheel, start, self._expected, RESTARTED, len(content.strain)))
             raise
-        if news.turns:
-            self._turn_came = 1e-9 * news.turns[-1].arrival
         self._report(news)
 
     def _too_late(self, age: float) -> bool:
@@ -207,6 +207,7 @@ class _Estimator:
         for turn in news.turns:
             self._turn_length = turn.device_time - self._last_turn
             self._last_turn = turn.device_time
+            self._turn_came = on_time(1e-9 * turn.arrival, self._turn_came, self._turn_length)
         if news:
             self.send(Report(news))
 
@@ -253,6 +254,24 @@ def rest(since: float, length: float) -> float:
     """
     left = RESTED * length - since
     return min(left, LONGEST_REST) if left > 0.0 else 0.0
+
+
+def on_time(came: float, before: float, length: float) -> float:
+    """Return when the bytes that ended a turn would have come if none had been late, [s].
+
+    A read that was late says nothing of when the next turn is due.
+
+    Parameters
+    ----------
+    came : float, [s]
+        When they came.
+    before : float, [s]
+        The same of the turn before, if none had been late; NaN where there was none.
+    length : float, [s]
+        Length of the turn by the wheel's clock; NaN where it is not known.
+    """
+    due = before + (1.0 + CLOCKS_APART) * length
+    return due if 0.0 < came - due < 0.5 * length else came
 
 
 def _age(block: Block) -> float:
