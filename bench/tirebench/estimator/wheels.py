@@ -46,8 +46,8 @@ class Block:
         Device time of the wheel's very first sample.
     content : Samples or BusCondition
     parts : tuple of (int, int)
-        Of samples that came in several reads: how many had come with each of them, and its arrival;
-        empty where one read brought them.
+        Where several reads brought the samples: how many samples had come by the end of each read,
+        and when it arrived. Empty where one read brought them.
     """
 
     wheel: int

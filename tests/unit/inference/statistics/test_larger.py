@@ -105,3 +105,7 @@ def test_one_effect_more_is_not_there_if_one_out_of_its_range_is_likelier() -> N
     likelier = replace(other, exact=both.exact + 1.0, plausible=False)
     among._made[frozenset(other.names)] = likelier
     assert among.against_larger(alone) is alone
+    among._made[frozenset(other.names)] = other
+    assert among.against_larger(alone).rival
+    among._made[frozenset(both.names)] = replace(both, plausible=False)
+    assert among.against_larger(alone) is alone
