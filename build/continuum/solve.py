@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from dataclasses import fields as fields_of
+from functools import cached_property
 
 import numpy as np
 
@@ -38,16 +39,29 @@ class Model:
 
 @dataclass(frozen=True)
 class State:
-    """A solved state; `by_load` is the derivative of the displacements with the load [m/N].
-
-    `stiffness` is the vertical one at constant speed [N/m], `iterations` those of Newton's method.
-    """
+    """A solved state; `iterations` are those of Newton's method."""
 
     model: Model
     balance: Balance
-    by_load: Array
-    stiffness: float
     iterations: int
+
+    @cached_property
+    def _response(self) -> tuple[Array, float]:
+        """How displacements and height change with one newton of load."""
+        now = self.balance
+        more = replace(now, cond=replace(now.cond, load=now.road.load + 1.0))
+        return step(more, None, now.factor)[:2]
+
+    @property
+    def by_load(self) -> Array:
+        """Derivative of the displacements with the load [m/N]."""
+        return self._response[0]
+
+    @property
+    def stiffness(self) -> float:
+        """Vertical stiffness at constant speed [N/m]."""
+        higher = self._response[1]
+        return -1.0 / higher if higher else 0.0
 
     @property
     def omega(self) -> float:
@@ -159,14 +173,8 @@ def _newton(
         before = rolling
         rolling = rolling + part * further if tire.friction else rolling_radius(model, now)
         if size < SMALLEST and abs(rolling - before) < SMALLEST:
-            return _state(model, now, count)
+            return State(model, now, count)
     raise ArithmeticError(
         f"{tire.name}: no balance at {cond.load:.0f} N, {cond.pressure / 1e5:.2f} bar, "
         f"{3.6 * cond.speed:.0f} km/h after {count} iterations; start from a state nearer by"
     )
-
-
-def _state(model: Model, now: Balance, count: int) -> State:
-    more = replace(now, cond=replace(now.cond, load=now.road.load + 1.0))
-    moved, higher, _ = step(more, None, now.factor)
-    return State(model, now, moved, -1.0 / higher if higher else 0.0, count)

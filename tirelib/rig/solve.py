@@ -58,6 +58,8 @@ class RigState:
         Derivative of `control` with the load at constant rolling condition [1/N].
     stiffness : float
         Vertical stiffness, -d load / d height [N/m].
+
+        Both are NaN in `straight`: they are found for the state that is asked for only.
     steps : int
         Newton steps taken.
     straight : RigState or None
@@ -127,7 +129,7 @@ def solve(
         start = _from_unloaded(tire, free, grid)
     rolling = replace(free, slip_angle=0.0, camber=0.0)
     if cond.slip_ratio is None:
-        state = _approach(tire, free, start.straight or start)
+        state = _approach(tire, free, start.straight or start, response=True)
         if free == rolling:
             return state
         upright = _approach(tire, rolling, start.straight or start)
@@ -136,10 +138,11 @@ def solve(
     radius = straight.rolling_radius
     if start.straight is not None:
         try:
-            return replace(_newton(tire, cond, start, radius), straight=straight)
+            state = _newton(tire, cond, start, radius, response=True)
+            return replace(state, straight=straight)
         except SolverError:
             pass  # a start beyond full sliding may mislead: go from free rolling
-    return replace(_approach(tire, cond, straight, radius), straight=straight)
+    return replace(_approach(tire, cond, straight, radius, response=True), straight=straight)
 
 
 def _check(cond: Condition) -> None:
@@ -168,17 +171,28 @@ def _from_unloaded(tire: RigTire, cond: Condition, grid: Mesh) -> RigState:
 
 
 def _approach(
-    tire: RigTire, cond: Condition, start: RigState, free_radius: float | None = None
+    tire: RigTire,
+    cond: Condition,
+    start: RigState,
+    free_radius: float | None = None,
+    *,
+    response: bool = False,
 ) -> RigState:
     """Newton from a start, halving the way to the condition where it fails."""
     try:
-        return _newton(tire, cond, start, free_radius)
+        return _newton(tire, cond, start, free_radius, response=response)
     except SolverError:
-        return _halve(tire, cond, start, free_radius, 4)
+        return _halve(tire, cond, start, free_radius, 4, response=response)
 
 
 def _halve(
-    tire: RigTire, cond: Condition, start: RigState, free_radius: float | None, left: int
+    tire: RigTire,
+    cond: Condition,
+    start: RigState,
+    free_radius: float | None,
+    left: int,
+    *,
+    response: bool,
 ) -> RigState:
     was = start.condition
     if left == 0:
@@ -198,10 +212,11 @@ def _halve(
         slip_ratio=slip,
     )
     for goal in (middle, cond):
+        wanted = response and goal is cond
         try:
-            start = _newton(tire, goal, start, free_radius)
+            start = _newton(tire, goal, start, free_radius, response=wanted)
         except SolverError:
-            start = _halve(tire, goal, start, free_radius, left - 1)
+            start = _halve(tire, goal, start, free_radius, left - 1, response=wanted)
     return start
 
 
@@ -211,7 +226,10 @@ def _newton(
     start: RigState,
     free_radius: float | None = None,
     fixed_height: float | None = None,
+    *,
+    response: bool = False,
 ) -> RigState:
+    """Return the state at a condition; its derivative with the load where `response` asks."""
     grid, control = start.grid, start.control
     height, rolling = start.height, start.rolling_radius
     target = None
@@ -254,7 +272,7 @@ def _newton(
         height, rolling = height + scale * float(step[-2]), rolling + scale * float(step[-1])
         if largest < TOLERANCE:
             _check_zone(cond, now)
-            by_load = _by_load(now, apply)
+            by_load = _by_load(now, apply) if response else np.full_like(step, np.nan)
             return RigState(
                 tire=tire,
                 condition=cond,

@@ -106,9 +106,8 @@ class Balance:
             bristles[-2 - shear.e.size : -2] = True
             kept = np.flatnonzero(~bristles[order])
             order, matrix = order[kept], matrix[:, kept][kept]
-        lu = splu(
-            matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
+        # three quarters of the fill, and of the time, of the order by angle alone
+        lu = splu(matrix, permc_spec="COLAMD", diag_pivot_thresh=0.0)
 
         def apply(right: Array) -> Array:
             out = np.zeros_like(right)
