@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from plots_laws import LAWS
 
 from tirelib.core.parameters import read_tire
@@ -308,4 +309,5 @@ def draw(name: str, folder: Path) -> None:
     paint(axes)
     if all(panel.get_legend() is None for panel in axes):
         legend_below(figure, axes)
-    figure.savefig(folder / f"{name}.png", dpi=110)
+    figure.dpi = 110
+    FigureCanvasAgg(figure).print_png(folder / f"{name}.png")  # `savefig` would draw it twice

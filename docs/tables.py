@@ -61,7 +61,7 @@ REMEDIES = {
     "ACCELERATING": "Give the turn rate of the wheel (input `omega`), from a speed sensor, the "
     "rig or the vehicle.",
 }
-"""What to do about a flag; `tests/unit/test_documentation.py` asks for one for each."""
+"""What to do about a flag; `tests/chain/test_documentation.py` asks for one for each."""
 
 
 def in_order(name: str) -> int:
