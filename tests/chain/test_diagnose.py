@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from tests.unit.inference.diagnose.planted import EFFECT, STRENGTH, added, model_file, waves
+from tests.unit.inference.diagnose.planted import EFFECT, FEW, STRENGTH, added, model_file, waves
 from tirelib.cli import program
 from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import read_tire, write_tire
-from tirelib.effects import CATALOGUE
 from tirelib.measured.waveforms import Waveforms
 
 MINE = """
@@ -65,6 +64,7 @@ def test_the_named_effect_is_added_and_no_longer_a_candidate(
     model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     use(monkeypatch, waves(EFFECT, STRENGTH))
+    monkeypatch.setattr("tirelib.model.registration.registered_effects", lambda files: FEW)
     monkeypatch.setattr("tirelib.inference.extend.additions.extended", lambda *_: added()[0])
     monkeypatch.setattr("tirelib.inference.extend.additions.strain_models", lambda *_: None)
     second, target = tmp_path / "M2.toml", tmp_path / "A.json"
@@ -92,8 +92,7 @@ def test_without_repeats_nothing_is_named_and_the_noise_is_null(
     model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     use(monkeypatch, waves(EFFECT, STRENGTH, 0))
-    few = {name: CATALOGUE[name] for name in (EFFECT, "sidewall_damping", "temperature", "camber")}
-    monkeypatch.setattr("tirelib.model.registration.registered_effects", lambda files: few)
+    monkeypatch.setattr("tirelib.model.registration.registered_effects", lambda files: FEW)
     target = tmp_path / "D.json"
     found = call("diagnose", "anywhere", "--model", model, "--json", target)
     assert found.exit_code == 0, found.output

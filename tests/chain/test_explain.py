@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.chain.test_diagnose import Folder
-from tests.unit.inference.diagnose.planted import EFFECT, STRENGTH, model_file, waves
+from tests.unit.inference.diagnose.planted import EFFECT, FEW, STRENGTH, model_file, waves
 from tests.unit.inference.force_campaigns import brush_file, steady_runs, write_forces
 from tirelib.cli import program
 from tirelib.core.errors import TirelibError
@@ -66,6 +66,7 @@ def strain(tmp_path_factory: pytest.TempPathFactory) -> Any:
     with pytest.MonkeyPatch.context() as patch:
         for verb in ("compare", "diagnose", "add", "explain"):
             patch.setattr(f"tirelib.cli.{verb}.read_campaign", lambda path: Folder(measured))
+        patch.setattr("tirelib.model.registration.registered_effects", lambda files: FEW)
         for module in (waveforms, sys.modules["tirelib.inference.compare.compare"]):
             patch.setattr(
                 module, "measure_waveforms", lambda campaign, progress=None: campaign.measured

@@ -17,6 +17,7 @@ from tirelib.campaign import read_campaign
 from tirelib.cli import program
 from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import write_tire
+from tirelib.effects import CATALOGUE
 
 PLANTED = {"friction_pressure": 0.3, "stiffness_temperature": 0.5, "brush_camber": 0.08}
 PAIR = (
@@ -305,7 +306,11 @@ def test_without_repeats_there_are_hints_only(place: Path) -> None:
     assert "no condition was repeated" in found["messages"][-1]
 
 
-def test_a_model_that_does_not_fit_at_all_gets_no_name(place: Path) -> None:
+def test_a_model_that_does_not_fit_at_all_gets_no_name(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = {name: CATALOGUE[name] for name in ("friction_load", "stiffness_load", "ply_steer")}
+    monkeypatch.setattr("tirelib.model.registration.registered_effects", lambda files: few)
     found = done(
         "diagnose",
         place / "wrong",

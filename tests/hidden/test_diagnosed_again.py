@@ -34,7 +34,8 @@ def twice(runs: StraightRuns) -> tuple[Diagnosis, Diagnosis]:
 
 def test_nothing_more_is_named_on_the_rig() -> None:
     case = load_case(DATA / "1000-temperature-1.20.npz")
-    first, second = twice(straight_runs(case.waves.take(~case.held_out)))
+    seen = case.waves.take(~case.held_out)
+    first, second = twice(straight_runs(seen.take(np.arange(0, len(seen), 2))))
     assert first.named == ("temperature",)
     assert (second.verdict.kind, second.named) == ("none", ())
     # in units of the noise; the second fit's priors lie about the first one's numbers
