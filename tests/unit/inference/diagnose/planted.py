@@ -21,10 +21,7 @@ LOADS = (2400.0, 4200.0, 6000.0)
 PRESSURES = (1.7e5, 2.3e5)
 EFFECT, STRENGTH = "sidewall_load", 0.3
 NOISE = 2e-6
-FEW = {
-    name: CATALOGUE[name]
-    for name in (EFFECT, "sidewall_damping", "temperature", "camber")
-}
+FEW = {name: CATALOGUE[name] for name in (EFFECT, "sidewall_damping", "temperature", "camber")}
 """The catalogue of tests that need no more: the planted effect, others, and one that is dead."""
 
 
