@@ -135,9 +135,9 @@ def core_file(calibration: Calibration) -> bytes:
 
 def _hash(data: bytes) -> int:
     """Return the FNV-1a hash of bytes, as `state_hash` of the core does, so that damage is seen."""
-    found = 14695981039346656037
+    found, factor, low_bits = 14695981039346656037, 1099511628211, (1 << 64) - 1
     for byte in data:
-        found = (found ^ byte) * 1099511628211 % (1 << 64)
+        found = (found ^ byte) * factor & low_bits
     return found
 
 

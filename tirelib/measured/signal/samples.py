@@ -32,7 +32,8 @@ class LastSamples:
     def __init__(self, gages: int, centre: int, room: int) -> None:
         self._gages, self._centre = gages, centre
         # rows: gages, then the held conditions, then the trigger
-        self._values = np.full((gages + len(HELD) + 1, room), np.nan)
+        # zeros take memory when they are written; what lies behind `end` is never read
+        self._values: FloatArray = np.zeros((gages + len(HELD) + 1, room))
         self.base = self.end = 0
 
     def take(
