@@ -1,6 +1,7 @@
 """The last samples of a wheel, each by its number since the start, in bounded memory."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +50,7 @@ class LastSamples:
         columns = slice(filled, filled + n)
         self._values[: self._gages, columns] = strain[:, part]
         for row, name in enumerate(HELD, start=self._gages):
-            value = held.get(name, np.nan)
+            value: Any = held.get(name, np.nan)
             self._values[row, columns] = value[part] if isinstance(value, np.ndarray) else value
         self._values[-1, columns] = np.nan if trigger is None else trigger[part]
         self.end += n
