@@ -20,8 +20,8 @@ REUSE = 0.3
 as seven such steps."""
 SETTLED = 1e-6
 """Allowed residual of the right side where a derivative is found with old factors."""
-FIRST_DEFLECTIONS = (0.002, 0.01)
-"""Deflections on the way from the unloaded tire to the first load [m]."""
+FIRST_DEFLECTION = 0.004
+"""Deflection between the unloaded tire and the first load [m]."""
 LIMITS = {
     "load": (200.0, 12000.0),
     "pressure": (0.5e5, 5e5),
@@ -156,7 +156,7 @@ def _check(cond: Condition) -> None:
 
 
 def _from_unloaded(tire: RigTire, cond: Condition, grid: Mesh) -> RigState:
-    """Lower the inflated tire onto the road in steps of deflection."""
+    """Lower the inflated tire onto the road."""
     straight = replace(cond, slip_angle=0.0, camber=0.0, slip_ratio=None)
     rolling = tire.free_radius
     control = np.zeros((grid.n, FIELDS))
@@ -164,10 +164,8 @@ def _from_unloaded(tire: RigTire, cond: Condition, grid: Mesh) -> RigState:
     top = tire.free_radius + control[0, 0]
     zero = np.zeros_like(control)
     state = RigState(tire, straight, grid, control, top, rolling, rolling, zero, 0.0, 0)
-    for deflection in FIRST_DEFLECTIONS:
-        state = replace(state, height=top - deflection)
-        state = _newton(tire, straight, state, None, top - deflection)
-    return state
+    height = top - FIRST_DEFLECTION
+    return _newton(tire, straight, replace(state, height=height), None, height)
 
 
 def _approach(
