@@ -2,13 +2,15 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 
+from tirelib.rig import solve as module
 from tirelib.rig.measure import slip_ratio
 from tirelib.rig.observe import Forces, contact, edges, forces, trace
-from tirelib.rig.solve import RigState, solve
+from tirelib.rig.solve import RigState, SolverError, solve
 from tirelib.rig.tire import Condition, RigTire
 
 TIRE = RigTire()
@@ -143,3 +145,27 @@ def test_combined_slip_takes_from_both_forces() -> None:
     both = force(slip_angle=0.07, slip_ratio=-0.1)
     assert abs(both.fx) < abs(force(slip_ratio=-0.1).fx)
     assert abs(both.fy) < abs(force(slip_angle=0.07).fy)
+
+
+def test_a_state_tells_its_derivative_with_the_load_whatever_way_it_was_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Directly, from another slip ratio, and by half of the way."""
+    whole, failed = module._newton, []
+
+    def too_far(tire: RigTire, cond: Condition, *rest: Any, **named: Any) -> RigState:
+        if cond.slip_angle == 0.05 and not failed:
+            failed.append(cond)
+            raise SolverError("too far")
+        return whole(tire, cond, *rest, **named)
+
+    braked = solve(TIRE, replace(BASE, slip_ratio=-0.03), state(slip_ratio=-0.01))
+    monkeypatch.setattr(module, "_newton", too_far)
+    halved = solve(TIRE, replace(BASE, slip_angle=0.05), state())
+    assert failed
+    for found, direct in ((braked, state(slip_ratio=-0.03)), (halved, state(slip_angle=0.05))):
+        assert found.stiffness == pytest.approx(direct.stiffness, rel=1e-5)
+        most = np.abs(direct.by_load).max()
+        np.testing.assert_allclose(found.by_load, direct.by_load, atol=1e-5 * most)
+        assert found.straight is not None
+        assert np.isnan(found.straight.stiffness)
