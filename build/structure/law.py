@@ -80,7 +80,7 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
     except TirelibError as error:
         say(f"{file.name}: {error}")
         return None
-    views = [fit.view(problem, width) for width in OWN]
+    views = fit.views(problem, OWN)
     found = []
     for law in GRID:
         found.append(

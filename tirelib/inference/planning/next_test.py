@@ -333,7 +333,8 @@ def gains(
     rivals = [rival for rival in test.rivals if rival.name != NOTHING]
     out: dict[str, dict[float, float]] = {rival.name: {} for rival in rivals}
     for times in (*PLAN_REPEATS, ENDLESS):
-        again = nothing.fit.view(problem.repeated(min(times, MOST_REPEATS)), nothing.null.view.own)
+        repeated = problem.repeated(min(times, MOST_REPEATS))
+        (again,) = nothing.fit.views(repeated, [nothing.null.view.own])
         null = nothing.null.about(again, nothing.null.size)
         for rival in rivals:
             scale = hypotheses.effects[rival.name].scale

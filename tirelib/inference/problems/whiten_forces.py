@@ -69,6 +69,14 @@ class PointWhitener:
 
     def __call__(self, rows: FloatArray) -> FloatArray:
         """Return whitened rows (..., n)."""
+        return self.white(rows)
+
+    def reduced(self, rows: FloatArray) -> FloatArray:
+        """Return rows as they are: every number of a force counts."""
+        return rows
+
+    def white(self, rows: FloatArray) -> FloatArray:
+        """Return whitened rows (..., n)."""
         out = np.empty_like(rows)
         for index, _, inverse in self.parts:
             out[..., index] = rows[..., index] @ inverse.T

@@ -113,10 +113,23 @@ class Whitener:
 
     def __call__(self, rows: FloatArray) -> FloatArray:
         """Return whitened rows (..., n)."""
+        return self.white(self.reduced(rows))
+
+    def reduced(self, rows: FloatArray) -> FloatArray:
+        """Return the harmonics of rows (..., n_runs, n_phi), which no size of the misfit changes.
+
+        Returns
+        -------
+        shape (n_runs, n_harmonics, ...)
+        """
         found = np.asarray(rows @ self.harmonics)
-        by_run = np.moveaxis(found.reshape(-1, *found.shape[-2:]), 0, 2)
-        white = np.moveaxis(self.inverse @ by_run, 2, 0)
-        return np.ascontiguousarray(white).reshape(*rows.shape[:-2], -1)
+        return np.ascontiguousarray(np.moveaxis(found, (-2, -1), (0, 1)))
+
+    def white(self, reduced: FloatArray) -> FloatArray:
+        """Return whitened rows (..., n) of what `reduced` gave."""
+        n_runs, n_harmonics, *rows = reduced.shape
+        white = self.inverse @ reduced.reshape(n_runs, n_harmonics, -1)
+        return np.moveaxis(white, 2, 0).reshape(*rows, -1)
 
     def take(self, index: slice) -> "Whitener":
         """Return the whitening of some runs."""

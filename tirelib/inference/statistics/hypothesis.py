@@ -17,6 +17,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from tirelib.core.arrays import FloatArray
+from tirelib.inference.statistics.normal import blocks_of
 from tirelib.inference.statistics.null import OWN, PRIOR, Null, Products
 from tirelib.inference.statistics.plain import BASE, ROUGHLY, Family, View
 from tirelib.inference.statistics.posterior import Posterior
@@ -175,7 +176,7 @@ def judged(
     own_effects : int
         How many of the fit's effects the model had already: they are part of it.
     """
-    views = [fit.view(problem, own) for own in OWN]
+    views = fit.views(problem, OWN)
     alike = list(dict.fromkeys(_each(fit, law) for law in LAWS))
     found = {laws: _likeliest(views, fit, families, laws) for laws in alike}
     laws = max(alike, key=lambda laws: found[laws][0])
@@ -292,12 +293,9 @@ def _drawn(
 
     The errors of the hypothesis' laws are drawn with the given variances.
     """
-    blocks, first = {}, 0
-    for name, each in fit.rows.items():
-        blocks[name] = slice(first, first + len(each))
-        first += len(each)
+    blocks = blocks_of(fit.rows)
     random = np.random.default_rng(list(family.name.encode()))
-    planted = family.on(blocks, first)
+    planted = family.on(blocks, sum(map(len, fit.rows.values())))
     for name, variance in laws.items():
         block = blocks[name]
         size = (len(family), block.stop - block.start)

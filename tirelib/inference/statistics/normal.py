@@ -23,6 +23,12 @@ LEAST_VARIANCE = 1e-11
 """Variance that stands for none: so little that no sample tells it from zero."""
 
 
+def blocks_of(rows: Mapping[str, FloatArray]) -> dict[str, slice]:
+    """Return where the rows (k, ...) of each name stand if they are put one after the other."""
+    ends = np.cumsum([len(block) for block in rows.values()]).tolist()
+    return dict(zip(rows, map(slice, [0, *ends], ends), strict=False))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Normal:
     """Normal equations.
@@ -59,15 +65,16 @@ class Normal:
 
         Without `whiten` they are white already, of shapes (k, n) and (n,).
         """
-        blocks, first = {}, 0
-        for name, block in rows.items():
-            blocks[name] = slice(first, first + len(block))
-            first += len(block)
         every = np.concatenate(list(rows.values()))
         if whiten is not None:
             every, rest = whiten(every), whiten(rest)
-        none = np.zeros(len(every))
-        return cls(blocks, every @ every.T, every @ rest, float(rest @ rest), rest.size, none)
+        return cls.stacked(blocks_of(rows), every, rest)
+
+    @classmethod
+    def stacked(cls, blocks: Mapping[str, slice], white: FloatArray, rest: FloatArray) -> "Normal":
+        """Return the normal equations of white rows (m, n), all in one, and a residual (n,)."""
+        none = np.zeros(len(white))
+        return cls(blocks, white @ white.T, white @ rest, float(rest @ rest), rest.size, none)
 
     def about(self, means: Mapping[str, float]) -> "Normal":
         """Return the normal equations of what is left once blocks have these coefficients."""

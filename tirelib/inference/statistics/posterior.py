@@ -19,7 +19,7 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError
 from tirelib.effects import Effect
 from tirelib.inference.statistics.downhill import Whiten, downhill
-from tirelib.inference.statistics.normal import LEAST_VARIANCE, Normal, Weighed
+from tirelib.inference.statistics.normal import LEAST_VARIANCE, Normal, Weighed, blocks_of
 from tirelib.inference.statistics.plain import BASE, ROUGHLY, View
 from tirelib.inference.statistics.problem import Model, Point, Problem
 from tirelib.inference.statistics.quadratic import Ends, Quadratic
@@ -141,15 +141,16 @@ class Posterior:
         by |= {effect.name: self.rows[effect.name] for effect in self.point.effects[self.count :]}
         return np.concatenate([self.rows[BASE][:base], *(by[e.name] for e in point.effects)])
 
-    def view(self, problem: Problem, own: float) -> View:
-        """Return the normal equations for one size of the misfit that each run has for itself."""
-        whiten = problem.whitener(own)
-        white, first = {}, 0
-        every = whiten(np.concatenate(list(self.rows.values())))
-        for name, rows in self.rows.items():
-            white[name] = every[first : first + len(rows)]
-            first += len(rows)
-        return View(own, Normal.of(white, whiten(self.rest)), whiten.log_volume, every)
+    def views(self, problem: Problem, sizes: Sequence[float]) -> list[View]:
+        """Return the normal equations for sizes of the misfit that each run has for itself."""
+        whitenings = [problem.whitener(own) for own in sizes]
+        every = np.concatenate([*self.rows.values(), self.rest[None]])
+        reduced, out = whitenings[0].reduced(every), []
+        for own, whitening in zip(sizes, whitenings, strict=True):
+            white = whitening.white(reduced)
+            normal = Normal.stacked(blocks_of(self.rows), white[:-1], white[-1])
+            out.append(View(own, normal, whitening.log_volume, white[:-1]))
+        return out
 
     def std(self, index: int) -> FloatArray:
         """Return standard deviations of an effect's strength, in its unit."""

@@ -60,6 +60,12 @@ class Whitening(Protocol):
     def __call__(self, rows: FloatArray) -> FloatArray:
         """Return whitened rows."""
 
+    def reduced(self, rows: FloatArray) -> FloatArray:
+        """Return what of rows the whitening needs, whatever the size of a run's own misfit."""
+
+    def white(self, reduced: FloatArray) -> FloatArray:
+        """Return whitened rows (k, n) of what `reduced` gave of rows (k, ...)."""
+
     def coloured(self, white: FloatArray) -> FloatArray:
         """Return rows (k, ...) whose whitened ones are these, (k, n)."""
 

@@ -32,6 +32,10 @@ SINGLES, PARTNERS, LEADERS, FURTHER = 6, 3, 2, 2
 beside each hypothesis that stays."""
 MOST_EFFECTS = 3
 """Effects of a hypothesis at most."""
+PROMISED = 0.1
+"""Share of the most that any effect gains to first order below which an effect is not fitted. A fit
+gains what it promised, or up to three times as much where a law has a kink. Half and double of it:
+docs/theory/verdict_numbers.md."""
 LOOKALIKE_ANGLE = np.deg2rad(80.0)
 """Angle between signatures below which one effect is tried in the place of another: it says what is
 tried, and not what is told."""
@@ -211,4 +215,18 @@ def _further(leader: Hypothesis, effects: dict[str, Effect], most: int) -> list[
     least = sorted(names, key=lambda name: left[name])
     likeliest = sorted(names, key=lambda name: -leader.further[name])
     turns = (name for each in zip(standing, likeliest, least, strict=True) for name in each)
-    return list(dict.fromkeys(turns))[:most]
+    promising = _promising(leader, names)
+    return [name for name in dict.fromkeys(turns) if name in promising][:most]
+
+
+def _promising(leader: Hypothesis, names: Sequence[str]) -> set[str]:
+    """Return the effects that gain enough to first order, with exact laws or with the leader's."""
+    exact = {name: leader.further[name] - leader.exact for name in names}
+    before = max(null.likelihood for null in leader.nulls)
+    rough = {name: max(null.gained[name] for null in leader.nulls) - before for name in names}
+    out: set[str] = set()
+    for gains in (exact, rough):
+        most = max(gains.values(), default=0.0)
+        # where no effect gains anything, each may do so beyond first order
+        out |= {name for name, gain in gains.items() if most <= 0.0 or gain >= PROMISED * most}
+    return out

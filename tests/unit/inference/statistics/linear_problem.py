@@ -47,7 +47,13 @@ class Louder:
         self.log_volume = -N * float(np.log(self.std))
 
     def __call__(self, rows: FloatArray) -> FloatArray:
-        return np.asarray(rows / self.std)
+        return self.white(rows)
+
+    def reduced(self, rows: FloatArray) -> FloatArray:
+        return rows
+
+    def white(self, reduced: FloatArray) -> FloatArray:
+        return np.asarray(reduced / self.std)
 
     def coloured(self, white: FloatArray) -> FloatArray:
         return np.asarray(white * self.std)

@@ -24,6 +24,12 @@ class Louder:
     def __call__(self, rows: FloatArray) -> FloatArray:
         return np.asarray(rows)
 
+    def reduced(self, rows: FloatArray) -> FloatArray:
+        return rows
+
+    def white(self, reduced: FloatArray) -> FloatArray:
+        return reduced
+
     def coloured(self, white: FloatArray) -> FloatArray:
         return np.asarray(white)
 

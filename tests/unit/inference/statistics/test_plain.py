@@ -25,7 +25,7 @@ def view(**planted: float) -> View:
 def seen(measured: np.ndarray) -> View:
     toy = Toy(measured)
     fit = posterior(toy, (), family(40).shown(), toy.whitener(0.001))
-    return fit.view(toy, 0.0005)
+    return fit.views(toy, [0.0005])[0]
 
 
 def test_a_familys_mean_is_learned_apart_from_its_spread(tmp_path) -> None:

@@ -365,18 +365,45 @@ def test_starts_that_end_in_one_model_go_on_as_one() -> None:
     assert _apart(toy, toy.starts, [fits[0], None, fits[2]])[1] is toy.starts[1]
 
 
+def leading(
+    scores: dict[str, float], *, exact: dict[str, float], rough: dict[str, float] | None = None
+) -> Any:
+    """Return a hypothesis beside which effects have these scores and gain so much, [nats]."""
+    gained = {name: 100.0 + gain for name, gain in (rough or dict.fromkeys(exact, 1.0)).items()}
+    null = SimpleNamespace(
+        names=list(exact),
+        left=lambda names: dict.fromkeys(names, 6.0),
+        likelihood=100.0,
+        gained=gained,
+    )
+    further = {name: 50.0 + gain for name, gain in exact.items()}
+    return SimpleNamespace(null=null, nulls=(null,), scores=scores, exact=50.0, further=further)
+
+
 def test_effects_that_stand_out_are_tried_though_all_leave_the_same() -> None:
     """A shape that no effect explains to first order leaves its own score beside every effect."""
     scores = {"a": 0.1, "b": 0.0, "c": 0.2, "d": 3.7, "e": 5.7, "shape": 6.0}
-    null = SimpleNamespace(names=list("abcde"), left=lambda names: dict.fromkeys(names, 6.0))
-    exact = {"a": -9.0, "b": 3.0, "c": -8.0, "d": -7.0, "e": -6.0}
-    leader: Any = SimpleNamespace(null=null, scores=scores, further=exact)
+    leader = leading(scores, exact={**dict.fromkeys("acde", 0.4), "b": 3.0})
     effects: Any = dict.fromkeys("abcde")
     assert _further(leader, effects, 1) == ["e"]
     # one that the error of a law hides is the likeliest with an exact law
     assert _further(leader, effects, 2) == ["e", "b"]
     assert {"d", "b", "e"} <= set(_further(leader, effects, 4))
     assert set(_further(leader, effects, 9)) == set("abcde")
+
+
+def test_an_effect_is_not_fitted_that_promises_little_beside_another() -> None:
+    scores = {"a": 9.0, "b": 8.0, "c": 3.0, "d": 2.0, "e": 1.0}
+    effects: Any = dict.fromkeys("abcde")
+    gains = {"a": 400.0, "b": 41.0, "c": 39.0, "d": 5.0, "e": -60.0}
+    leader = leading(scores, exact=gains, rough=gains)
+    assert _further(leader, effects, 5) == ["a", "b"]
+    # the error of a law hides one, another one fits the error of a law
+    leader = leading(scores, exact={**gains, "c": 700.0}, rough={**gains, "d": 300.0})
+    assert set(_further(leader, effects, 5)) == {"a", "c", "d", "b"}
+    # none gains to first order
+    leader = leading(scores, exact=dict.fromkeys("abcde", -3.0), rough=dict.fromkeys("abcde", -3.0))
+    assert set(_further(leader, effects, 5)) == set("abcde")
 
 
 @pytest.mark.parametrize(("start", "tried"), [((0.5,), True), ((), False)])
