@@ -128,7 +128,8 @@ def fit_of(file: Path) -> Fit | None:
 def family_of(name: str, fits: Sequence[Fit]) -> Family:
     """Return what a family's tires show."""
     tires = [
-        [replace(fit.view(problem, own), white=np.zeros(0)) for own in OWN] for problem, fit in fits
+        [replace(view, white=np.zeros(0)) for view in fit.views(problem, OWN)]
+        for problem, fit in fits
     ]
     family = learn(name, tires, fits[0][0].widths)
     say(f"{name}: {len(fits)} tires, median of a run's own misfit {family.own:g}")
