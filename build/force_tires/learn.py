@@ -70,7 +70,8 @@ def fit_of(family: str, seed: int, quantity: str) -> Fit | None:
 def family_of(name: str, fits: Sequence[Fit]) -> Family:
     """Return what a family's tires show."""
     tires = [
-        [replace(fit.view(problem, own), white=np.zeros(0)) for own in OWN] for problem, fit in fits
+        [replace(view, white=np.zeros(0)) for view in fit.views(problem, OWN)]
+        for problem, fit in fits
     ]
     return learn(name, tires, fits[0][1].widths, LARGEST)
 
