@@ -135,6 +135,7 @@ def test_the_diagnosis_has_the_contracts_keys(planted: Any) -> None:
             "power",
             "p",
             "p_std",
+            "gain",
         }
     assert [entry["rank"] for entry in told["candidates"]] == list(
         range(1, len(told["candidates"]) + 1)
@@ -149,6 +150,8 @@ def test_the_planted_effect_is_named_with_errors_that_fall(planted: Any) -> None
     assert first["effect"] == EFFECT
     assert first["level"] == "alarm"
     assert first["score"] > first["threshold"]
+    gains = [entry["gain"] for entry in told["candidates"]]
+    assert first["gain"] > 20.0 + max(gains[1:])
     assert told["p_without"] <= told["false_alarm"] == 0.05
     assert told["sets"] == [[EFFECT]]
     assert first["error_after"] == told["error_after"] < 0.5 * told["error_before"]

@@ -41,6 +41,9 @@ class Finding:
         alarm for members of a named set, hint for members of other smallest sets, else quiet.
     p, p_std : float
         p-value of the hypothesis that this effect is missing and no other.
+    gain : float
+        Log likelihood of this hypothesis with an exact law over that of the model as it is, [nats];
+        to first order where it was not fitted.
     strength, std : shape (components,)
     share : float
         Part of the squared error that this effect alone takes away, to first order.
@@ -55,6 +58,7 @@ class Finding:
     level: str
     p: float
     p_std: float
+    gain: float
     strength: FloatArray
     std: FloatArray
     in_range: bool
@@ -82,6 +86,7 @@ class Finding:
             "level": self.level,
             "p": self.p,
             "p_std": self.p_std,
+            "gain": self.gain,
             "strength": strength_told(self.strength),
             "std": strength_told(self.std),
             "unit": effect.unit,
@@ -241,6 +246,7 @@ def findings_of(
             strength = effect.scale * mean
             std = effect.scale * np.sqrt(np.diag(covariance))
         p, p_std = first.p_of(left[name]) if alone is None else (alone.p, alone.p_std)
+        gain = first.gain(name) if alone is None else alone.exact - first.exact
         level = "alarm" if name in named else "hint" if name in members else "quiet"
         rows.append(
             Finding(
@@ -250,6 +256,7 @@ def findings_of(
                 level,
                 p,
                 p_std,
+                gain,
                 strength,
                 std,
                 _plausible(effect, strength, 2.0 * std),

@@ -150,6 +150,16 @@ class Hypothesis:
             p = max(p, float(chi2.sf(square, left.size)))
         return p
 
+    def gain(self, name: str) -> float:
+        """Return by how much a further effect with an exact law raises `exact`, to first order.
+
+        `further` has the effect at its likeliest; here its strength is integrated over its prior,
+        as it is where the effect belongs to the hypothesis.
+        """
+        _, covariance = self.null.beside(name)
+        volume = np.linalg.slogdet(covariance / PRIOR**2)[1]
+        return float(self.further[name] - self.exact + 0.5 * volume)
+
     def limit(self, alpha: float) -> float:
         """Return the statistic from which on the p-value is at most alpha."""
         return max(float(np.quantile(each, 1.0 - alpha, method="higher")) for each in self.plain)

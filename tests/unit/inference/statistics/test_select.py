@@ -417,3 +417,18 @@ def test_an_effect_that_states_a_start_is_tried_whatever_it_does_at_zero(
     found = select(toy, FAMILIES)
     assert found.sets == (("swell",),)
     assert (("twist",) in [h.names for h in found.tried]) is tried
+
+
+@pytest.mark.parametrize("strength", [0.2, 0.6])
+def test_where_all_is_linear_a_fit_gains_what_the_effect_promised(strength: float) -> None:
+    """Both are likelihoods with exact laws: one with the effect beside the base, one within it.
+
+    Beside the base it is allowed what plain tires show of it in addition.
+    """
+    toy = Toy(drawn(np.random.default_rng(8), swell=strength))
+    hypotheses = Hypotheses(toy, FAMILIES)
+    base = hypotheses.base
+    for name in ("swell", "bend"):
+        alone = hypotheses.at([name])
+        assert alone is not None
+        assert alone.exact - base.exact == pytest.approx(base.gain(name), abs=0.5)
