@@ -151,21 +151,38 @@ def test_a_state_tells_its_derivative_with_the_load_whatever_way_it_was_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Directly, from another slip ratio, and by half of the way."""
-    whole, failed = module._newton, []
+    whole, asked = module._newton, []
 
     def too_far(tire: RigTire, cond: Condition, *rest: Any, **named: Any) -> RigState:
-        if cond.slip_angle == 0.05 and not failed:
-            failed.append(cond)
+        asked.append(cond)
+        if asked.count(cond) == 1 and cond in (turned, slowed):
             raise SolverError("too far")
         return whole(tire, cond, *rest, **named)
 
-    braked = solve(TIRE, replace(BASE, slip_ratio=-0.03), state(slip_ratio=-0.01))
+    turned, slowed = replace(BASE, slip_angle=0.05), replace(BASE, slip_ratio=-0.1)
+    near = solve(TIRE, slowed, state(slip_ratio=-0.03))
     monkeypatch.setattr(module, "_newton", too_far)
-    halved = solve(TIRE, replace(BASE, slip_angle=0.05), state())
-    assert failed
-    for found, direct in ((braked, state(slip_ratio=-0.03)), (halved, state(slip_angle=0.05))):
+    halved = solve(TIRE, turned, state())
+    assert asked[1].slip_angle == pytest.approx(0.025)
+    asked.clear()
+    braked = solve(TIRE, slowed, replace(state(), straight=None))
+    assert asked[asked.index(slowed) + 1].slip_ratio == pytest.approx(-0.05)
+    pairs = (
+        (near, {"slip_ratio": -0.1}),
+        (braked, {"slip_ratio": -0.1}),
+        (halved, {"slip_angle": 0.05}),
+    )
+    for found, change in pairs:
+        direct = state(**change)
         assert found.stiffness == pytest.approx(direct.stiffness, rel=1e-5)
         most = np.abs(direct.by_load).max()
         np.testing.assert_allclose(found.by_load, direct.by_load, atol=1e-5 * most)
         assert found.straight is not None
         assert np.isnan(found.straight.stiffness)
+
+
+@pytest.mark.parametrize("change", [{"slip_angle": 0.1}, {"slip_angle": 0.05}])
+def test_the_free_radius_is_that_of_the_upright_wheel(change: dict[str, float]) -> None:
+    found = state(**change)
+    assert found.free_radius == pytest.approx(state().rolling_radius, rel=1e-9)
+    assert abs(found.rolling_radius / found.free_radius - 1.0) > 1e-5
