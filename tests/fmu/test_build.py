@@ -216,6 +216,10 @@ def test_same_calibration_same_bytes(tmp_path: Path) -> None:
     )
     assert twin.read_bytes() == live.fmu_file(10).read_bytes()
     assert live.fmu_file(1).read_bytes() != twin.read_bytes()
+    with zipfile.ZipFile(twin) as archive:
+        first, *others = archive.namelist()
+    assert first == "modelDescription.xml"  # where importers look for it
+    assert others == sorted(others)
 
 
 def test_the_build_leaves_no_trace_in_the_process(tmp_path: Path) -> None:
