@@ -25,7 +25,7 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import ParameterError
 from tirelib.core.held import HELD
 from tirelib.estimators.estimate import QUANTITIES
-from tirelib.fmu.run import LoadedFmu
+from tirelib.fmu.run import LoadedFmu, runs_with
 from tirelib.fmu.virtual.coordinates import FRICTION, INPUTS
 from tirelib.fmu.virtual.table import START
 
@@ -193,7 +193,7 @@ class VirtualTire:
         strains = [reference for name, reference in self._at.items() if name[:7] == "strain_"]
         wanted = [*strains, *(self._at[name] for name in _SHOWN)]
         self._n = len(strains)
-        self._folder = extract(str(path))
+        self._folder = extract(str(path), include=runs_with)
         self.slave: Any = FMU2Slave(
             guid=description.guid,
             unzipDirectory=self._folder,

@@ -17,7 +17,7 @@ from tirelib.campaign import CampaignHeader, Run, RunPlan, TireGeometry, write_c
 from tirelib.campaign.read import read_campaign
 from tirelib.estimators.calibration_file import write_calibration
 from tirelib.estimators.train import train
-from tirelib.fmu.run import keeping
+from tirelib.fmu.run import keeping, runs_with
 from tirelib.fmu.virtual.spec import build_virtual, default_surface, friction_surface
 from tirelib.fmu.virtual.surface import Surface, mirrored, read_surface
 from tirelib.measured.observations import observe
@@ -114,7 +114,7 @@ class Host:
             v.valueReference for v in description.modelVariables if v.name[:7] == "strain_"
         ]
         self.samples = len(self.strains) // 5
-        self.folder = extract(str(path))
+        self.folder = extract(str(path), include=runs_with)
         self.python = (Path(self.folder) / "resources" / "slavemodule.txt").is_file()
         self.slave: Any = FMU2Slave(
             guid=description.guid,

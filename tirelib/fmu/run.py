@@ -47,8 +47,8 @@ def keeping(messages: list[str]) -> Any:
     return found
 
 
-def _runs(name: str) -> bool:
-    """Return whether a file of the archive is needed to run it; sources and pages are not."""
+def runs_with(name: str) -> bool:
+    """Return whether an FMU runs with a file of its archive; it does without sources and pages."""
     return name.split("/")[0] in ("modelDescription.xml", "binaries", "resources")
 
 
@@ -90,7 +90,7 @@ class LoadedFmu:
         strains = [name for name in self.references if name.startswith("strain_")]
         self.samples = len(strains) // len(self.calibration.lateral)
         try:
-            self._folder = extract(str(path), include=_runs)
+            self._folder = extract(str(path), include=runs_with)
         except Exception as error:  # of zipfile, and FMPy's bare ones
             raise FormatError(
                 f"{path}: cannot be unpacked ({error}); the file is damaged: copy or build it again"
