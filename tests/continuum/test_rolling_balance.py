@@ -109,6 +109,13 @@ def test_the_stiffness_is_the_derivative_of_the_residual() -> None:
     np.testing.assert_allclose(scalars(now.road)[:, 0], seen, rtol=1e-4)
 
 
+def test_the_response_to_load_is_the_difference_of_two_states() -> None:
+    less, more = state(load=3990.0), state(load=4010.0)
+    assert 20.0 / (less.height - more.height) == pytest.approx(state().stiffness, rel=1e-3)
+    slope = (more.balance.u - less.balance.u) / 20.0
+    np.testing.assert_allclose(slope, state().by_load, atol=1e-2 * np.abs(slope).max())
+
+
 def test_hoop_strain_grows_with_speed_squared() -> None:
     omega = np.array([0.0, 40.0, 80.0, 120.0])
     strain = [
