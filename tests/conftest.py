@@ -63,6 +63,17 @@ def documents_are_as_their_schemas_say(tmp_path_factory: pytest.TempPathFactory)
     assert not wrong, "\n".join(wrong)
 
 
+@pytest.fixture(scope="module")
+def one_processor() -> Iterator[None]:
+    """Let the tests of a module not copy their process, which costs more than small problems do.
+
+    The other tests of the chain, and those of hidden effects, compute in copies, as users do.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tirelib.core.forked._processors", lambda: 1)
+        yield
+
+
 NOT_HERE = (
     "no {0}: these measurements are not part of the repository, so the tests on them are checks "
     "beside the others, which need nothing; TIRELIB_SHARED_DATA names the folder that holds them"
