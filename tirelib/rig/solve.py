@@ -21,7 +21,8 @@ as seven such steps."""
 SETTLED = 1e-6
 """Allowed residual of the right side where a derivative is found with old factors."""
 FIRST_DEFLECTION = 0.004
-"""Deflection between the unloaded tire and the first load [m]."""
+"""Deflection between the unloaded tire and the first load [m]. With half and double of it twelve
+random conditions take 299 and 300 Newton steps instead of 284, and end within 7e-12 m."""
 LIMITS = {
     "load": (200.0, 12000.0),
     "pressure": (0.5e5, 5e5),
@@ -57,9 +58,8 @@ class RigState:
     by_load : array, shape (n, 16)
         Derivative of `control` with the load at constant rolling condition [1/N].
     stiffness : float
-        Vertical stiffness, -d load / d height [N/m].
-
-        Both are NaN in `straight`: they are found for the state that is asked for only.
+        Vertical stiffness, -d load / d height [N/m]; it and `by_load` are NaN in `straight`,
+        because only the state that is asked for needs them.
     steps : int
         Newton steps taken.
     straight : RigState or None

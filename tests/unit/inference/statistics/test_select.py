@@ -421,9 +421,9 @@ def test_an_effect_that_states_a_start_is_tried_whatever_it_does_at_zero(
 
 @pytest.mark.parametrize("strength", [0.2, 0.6])
 def test_where_all_is_linear_a_fit_gains_what_the_effect_promised(strength: float) -> None:
-    """Both are likelihoods with exact laws: one with the effect beside the base, one within it.
+    """The gain to first order is that of a fit, up to what plain tires show of the effect.
 
-    Beside the base it is allowed what plain tires show of it in addition.
+    An effect that is not fitted may show what plain tires show in addition; a fitted one may not.
     """
     toy = Toy(drawn(np.random.default_rng(8), swell=strength))
     hypotheses = Hypotheses(toy, FAMILIES)
