@@ -110,9 +110,10 @@ class Hypotheses:
         beside it. Where that effect really acts, the runs are likelier with it and with exact laws
         than without it. Any of n effects may be the further one: a likelihood ratio of n / p in
         favour of one of them has at most the probability p where none is there (Bonferroni, and
-        Royall as in `tirelib.inference.statistics.rival`). Something without a name may stand beside the
-        hypothesis. Where the likeliest further effect is out of its range, or no larger than plain
-        tires show, it is something else that makes the runs likelier, and no effect is there.
+        Royall as in `tirelib.inference.statistics.rival`). Something without a name may stand
+        beside the hypothesis. Where the likeliest further effect is out of its range, or no larger
+        than plain tires show, it is something else that makes the runs likelier, and no effect is
+        there.
         """
         rival = max(self._larger(hypothesis), key=lambda h: h.exact, default=None)
         if hypothesis.p <= self.false_alarm or rival is None or not rival.plausible:
