@@ -120,12 +120,24 @@ class Hypotheses:
             return hypothesis
         further = next(k for k, name in enumerate(rival.names) if name not in hypothesis.names)
         ratio = min(hypothesis.unnamed - rival.exact, 0.0)
-        p = (len(self.effects) - len(self.added(hypothesis))) * float(np.exp(ratio))
+        p = self._count(hypothesis) * float(np.exp(ratio))
         if max(p, rival.p_plain(further)) > self.false_alarm:
             return hypothesis
         out = replace(hypothesis, rival=" and ".join(self.added(rival)), p_rival=p)
         self._made[frozenset(self.added(hypothesis))] = out
         return out
+
+    def needed(self, hypothesis: Hypothesis) -> float:
+        """Return by how much one effect more has to raise `exact` to reject a hypothesis, [nats].
+
+        See `against_larger`.
+        """
+        odds = self._count(hypothesis) / self.false_alarm
+        return float(hypothesis.unnamed - hypothesis.exact + np.log(odds))
+
+    def _count(self, hypothesis: Hypothesis) -> int:
+        """Return of how many effects one may be missing beside a hypothesis."""
+        return len(self.effects) - len(self.added(hypothesis))
 
     def _larger(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Return the hypotheses of one effect more that were fitted."""

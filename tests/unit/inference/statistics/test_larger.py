@@ -8,6 +8,7 @@ import pytest
 
 from tests.unit.inference.statistics.linear_problem import EFFECTS, N, Toy, by_effect, drawn, family
 from tirelib.core.arrays import FloatArray
+from tirelib.inference.statistics import select as select_
 from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.inference.statistics.hypothesis import LAWS, Hypothesis
 from tirelib.inference.statistics.problem import Point
@@ -60,6 +61,21 @@ def test_an_effect_that_the_error_of_a_law_may_show_is_named_beside_an_exact_law
     assert alone.p_of(alone.statistic)[0] > 0.05
     assert set(alone.rival.split(" and ")) == {"twist", "bend"}
     assert alone.p == alone.p_rival <= 0.05
+
+
+@pytest.mark.parametrize("kinked", [select_.KINKED, 1e9])
+def test_one_effect_more_is_fitted_only_where_it_could_reject_the_hypothesis(
+    kinked: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(select_, "KINKED", kinked)
+    found = select(planted(60, twist=1.0), FAMILIES)
+    assert found.sets == (("twist",),)
+    alone = found.hypotheses.at(["twist"])
+    assert alone is not None
+    need = found.hypotheses.needed(alone)
+    gains = [alone.further[name] - alone.exact for name in ("bend", "swell")]
+    worth = [kinked * gain >= need for gain in gains]
+    assert any(len(h.names) > 1 for h in found.tried) is any(worth) is (kinked > 1e3)
 
 
 @pytest.mark.parametrize("law", [0.0, LAWS[0]])
