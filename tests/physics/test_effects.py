@@ -54,6 +54,9 @@ IN_ORDER = [
     "gage_saturation",
     "gage_offset",
     "gage_drift",
+    "gain_load",
+    "gain_pressure",
+    "gain_speed",
     "angle_zero",
 ]
 ONE_SIDED = {"sidewall_damping", "trailing_sliding", "hydroplaning", "low_pass", "angle_zero"}

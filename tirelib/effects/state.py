@@ -12,6 +12,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import offset_at
 from tirelib.physics.contact.free_boundary import Start
 from tirelib.physics.contact.radial import RadialContact
 from tirelib.physics.contact.tread import Tread
@@ -68,7 +69,7 @@ READ = frozenset(
         *("innerliner_offset", "bending_stiffness", "mass", "radial_stiffness"),
         *("radial_pressure_slope", "tangential_stiffness", "tangential_pressure_slope", "damping"),
         *("extension_stiffness", "shear_stiffness", "rotary_inertia", "tread_stiffness"),
-        "tread_hardening",
+        *("tread_hardening", "offset_pressure_slope"),
     }
 )
 """Values of a tire that a state reads: the linear ring and its contact know no others."""
@@ -157,7 +158,12 @@ class State:
             free_radius=column("free_radius"),
             width=column("belt_width"),
             thickness=column("tread_thickness"),
-            offset=column("innerliner_offset"),
+            offset=offset_at(
+                column("innerliner_offset"),
+                column("offset_pressure_slope"),
+                conditions.pressure,
+                column("pressure"),
+            ),
             EI=column("bending_stiffness"),
             mass=column("mass"),
             tension_pressure=conditions.pressure,

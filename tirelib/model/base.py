@@ -74,6 +74,7 @@ PLAIN: tuple[Coordinate, ...] = (
     Coordinate("tread_hardening"),
     Coordinate("section_pull", 0.03),
     Coordinate("liner_share", 0.4),
+    Coordinate("offset_pressure_slope", 0.02),
     Coordinate("tread_poisson", 0.3),
     Coordinate("contact_crown"),
     Coordinate("creep"),
@@ -81,7 +82,8 @@ PLAIN: tuple[Coordinate, ...] = (
     Coordinate("centrifugal_tension"),
 )
 """Those of the plain tire: every belt shears and has section inertia, and sidewalls that spin with
-it, every gage sits on layers that the shear force leaves alone, every tread holds on to the road
+it, every gage sits on layers that the shear force leaves alone and whose distance to the neutral
+line changes with the pressure, every tread holds on to the road
 with a friction that grows with slip, hardens and grows wider when it is pressed, spreads the
 pressure over its thickness, and its strips meet the road one after the other."""
 

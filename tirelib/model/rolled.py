@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
+from tirelib.core.parameters import offset_at
 from tirelib.effects.state import Operating
 from tirelib.physics.rolling.assemble import Unknowns, by_element, changed, differ, fields
 from tirelib.physics.rolling.constants import Constants
@@ -71,7 +72,10 @@ def made_of(values: Values, points: Operating) -> Made:
         torque=0.0,
     )
     spread = np.asarray(v["tread_spread"]) * np.asarray(v["tread_thickness"])
-    each = (v["innerliner_offset"], v["liner_share"], spread)
+    offset = offset_at(
+        v["innerliner_offset"], v["offset_pressure_slope"], points.pressure, v["pressure"]
+    )
+    each = (offset, v["liner_share"], spread)
     places = [np.broadcast_to(np.asarray(x, dtype=float), (len(points),)) for x in each]
     return Made(constants, Gage(*places))
 

@@ -309,7 +309,7 @@ def _simulation(
 ) -> Simulation:
     """Return curves from tractions (pressure in the middle, pressure, normal, shear) and belt."""
     middle, pressure, normal, along = tractions
-    wave = strain_harmonics(displacement, tire.ring_radius, tire.innerliner_offset)
+    wave = strain_harmonics(displacement, tire.ring_radius, tire.offset_at(p))
     slope = wave * 1j * np.arange(wave.shape[-1])
     waves = (displacement[..., 0], displacement[..., 1], wave, slope)
     fine = [on_grid(x, FINE_ANGLES_PER_ANGLE * (N_ANGLES - 1)) for x in waves]

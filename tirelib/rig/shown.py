@@ -151,8 +151,15 @@ def debonded(shown: Shown, strength: float) -> Trace:
 
 
 def pressure_sensitive(shown: Shown, strength: float) -> Trace:
-    """Gages whose gain changes with the inflation pressure round them."""
-    return _scaled(shown.trace, 1.0 + strength * (shown.condition.pressure / 2e5 - 1.0))
+    """Gages whose gain changes with the root of the inflation pressure round them."""
+    return _scaled(
+        shown.trace, 1.0 + strength * 2.0 * (np.sqrt(shown.condition.pressure / 2e5) - 1)
+    )
+
+
+def heated(shown: Shown, strength: float) -> Trace:
+    """Gages that grow warm with the speed squared, and lose gain."""
+    return _scaled(shown.trace, 1.0 - strength * (shown.condition.speed / 30.0) ** 2)
 
 
 def feels_acceleration(shown: Shown, strength: float) -> Trace:

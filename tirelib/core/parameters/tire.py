@@ -7,6 +7,9 @@ from difflib import get_close_matches
 from types import MappingProxyType
 from typing import NamedTuple
 
+import numpy as np
+
+from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 
 
@@ -52,6 +55,9 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
         "rotary_inertia": Field("belt", "kg m", "rotary_inertia", 0.0, 1.0, "rho I"),
         "liner_share": Field(
             "belt", "1", "ratio", -2.0, 2.0, "part of y in layers that carry no shear force"
+        ),
+        "offset_pressure_slope": Field(
+            "belt", "1", "ratio", -0.3, 0.3, "growth of y for a pressure that doubles"
         ),
         "section_pull": Field(
             "sidewall", "1", "ratio", -0.3, 0.5, "share of p b that the sidewalls take inward"
@@ -162,6 +168,7 @@ class Tire:
     shear_stiffness: float = math.inf
     rotary_inertia: float = 0.0
     liner_share: float = 0.0
+    offset_pressure_slope: float = 0.0
     section_pull: float = 0.0
     centrifugal_tension: float = 1.0
     radial_pressure_slope: float = 0.0
@@ -195,6 +202,12 @@ class Tire:
         if found:
             raise ParameterError("tire: " + "; ".join(found))
 
+    def offset_at(self, pressure: FloatArray | float) -> FloatArray:
+        """Return the gages' offset y < 0 at a gauge pressure [Pa], in the pressure's shape, [m]."""
+        return offset_at(
+            self.innerliner_offset, self.offset_pressure_slope, pressure, self.pressure
+        )
+
     def changed(self, **values: float) -> "Tire":
         """Return the tire with some values replaced.
 
@@ -207,6 +220,16 @@ class Tire:
             if name not in FIELDS:
                 raise ParameterError(unknown_name(name))
         return replace(self, **values)
+
+
+def offset_at(
+    offset: FloatArray | float,
+    slope: FloatArray | float,
+    pressure: FloatArray | float,
+    reference: FloatArray | float,
+) -> FloatArray:
+    """Return y (1 + s (p / p0 - 1)): inflation bends a section, and so moves its neutral line."""
+    return np.asarray(offset * (1.0 + slope * (np.asarray(pressure) / reference - 1.0)))
 
 
 def unknown_name(name: str) -> str:

@@ -209,6 +209,7 @@ def start_file(
             for name, number in tire.numbers.items()
             if name != "damping"
             and (name not in OF_PLAIN or (base == "plain" and number.value > 0.0))
+            and (name != "offset_pressure_slope" or base == "plain")
             and np.isfinite(number.value)
         }
     for name, number in stated_lengths(header).items():

@@ -28,6 +28,7 @@ STRUCTURE_STD: Mapping[str, float] = MappingProxyType(
         "tread_hardening": 0.6,
         "section_pull": 0.5,
         "liner_share": 1.0,
+        "offset_pressure_slope": 0.0,
         "tread_poisson": 1.0,
         "contact_crown": 1.3,
         "creep": 1.3,

@@ -23,6 +23,7 @@ WIDTH = {
     "tread_hardening": 0.7,
     "section_pull": 1.5,
     "liner_share": 1.0,
+    "offset_pressure_slope": 1.5,
     "tread_poisson": 1.0,
     "contact_crown": 1.3,
     "creep": 1.3,
