@@ -352,6 +352,21 @@ def test_gain_is_the_innerliner_offset_and_saturation_takes_from_large_strain_on
     np.testing.assert_allclose(shown, bent - bent.mean(axis=1, keepdims=True))
 
 
+@pytest.mark.parametrize(
+    ("name", "condition", "reference"),
+    [("load", "load", 4000.0), ("pressure", "pressure", 2e5), ("speed", "speed", 20.0)],
+)
+def test_a_gain_goes_with_a_condition_about_its_reference(
+    name: str, condition: str, reference: float
+) -> None:
+    shown = at(f"gain_{name}", 0.1).waveform
+    assert shown is not None
+    over = getattr(PLAN.points, condition) / reference
+    assert np.ptp(over) > 0.2
+    expected = np.tile(1.0 + 0.1 * (over - 1.0)[:, None], (1, GRID.size))
+    np.testing.assert_allclose(shown / BASE, expected)
+
+
 def test_drift_is_none_in_the_middle_of_the_campaign_and_the_angles_zero_shifts_later() -> None:
     ratio = at("gage_drift", 0.1).waveform
     assert ratio is not None

@@ -35,6 +35,7 @@ GRIPPING = {
     "tread_hardening": 1.0,
     "section_pull": 0.03,
     "liner_share": 0.4,
+    "offset_pressure_slope": 0.04,
     "tread_poisson": 0.5,
     "contact_crown": 0.3,
     "creep": 0.005,
@@ -71,6 +72,23 @@ def test_an_effect_is_a_tire_with_other_constants(name: str, strength: float, fi
     if field == "tread":
         values["tread_stiffness"] = values["tread_stiffness"] * (POINTS.load / 4000.0) ** strength
     assert found.waveform == pytest.approx(at(values).waveform, abs=1e-11)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.05])
+def test_gages_whose_offset_goes_with_the_pressure_are_those_of_another_offset(
+    damping: float,
+) -> None:
+    """The rolling ring and, with damping, the linear one see y (1 + s (p / p0 - 1))."""
+    values = {**GRIPPING, "damping": damping, "offset_pressure_slope": 0.2}
+    grown = np.asarray(values["innerliner_offset"]) * (
+        1.0 + 0.2 * (POINTS.pressure - TIRE.pressure) / TIRE.pressure
+    )
+    each = {**values, "innerliner_offset": grown, "offset_pressure_slope": 0.0}
+    assert at(values).waveform == pytest.approx(at(each).waveform, abs=1e-12)
+    assert np.ptp(grown) > 0.05 * np.abs(grown).min()
+    assert grown == pytest.approx(
+        TIRE.changed(offset_pressure_slope=0.2).offset_at(POINTS.pressure)
+    )
 
 
 def test_tension_beyond_the_spinning_belts_own_is_what_less_inertia_leaves() -> None:
