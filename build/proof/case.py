@@ -139,6 +139,7 @@ def definition(tire: RigTire, pressure: float) -> dict[str, float]:
         "rotary_inertia": 0.0,
         "section_pull": grown_pull(tire, pressure),
         "liner_share": 0.0,
+        "offset_pressure_slope": 0.0,
         "tread_poisson": 0.0,
         "contact_crown": 0.0,
         "creep": 0.0,

@@ -125,6 +125,7 @@ def true() -> dict[str, float]:
         "tread_hardening": TIRE.tread_hardening,
         "section_pull": TIRE.radial_stiffness(mean) * grown / (mean * TIRE.belt_width),
         "liner_share": 0.0,
+        "offset_pressure_slope": 0.0,
         "tread_poisson": 0.0,
         "contact_crown": 0.0,
         "creep": 0.0,

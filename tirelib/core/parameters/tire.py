@@ -228,7 +228,7 @@ def offset_at(
     pressure: FloatArray | float,
     reference: FloatArray | float,
 ) -> FloatArray:
-    """Return y (1 + s (p / p0 - 1)): inflation bends a section, and so moves its neutral line."""
+    """Return y (1 + s (p / p0 - 1)): inflation presses the liner between belt and gage together."""
     return np.asarray(offset * (1.0 + slope * (np.asarray(pressure) / reference - 1.0)))
 
 

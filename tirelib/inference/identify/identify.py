@@ -291,7 +291,9 @@ def _help(estimate: Estimate, fit: WaveformFit, k: int, ways: NextRun) -> str:
     coordinate = fit.free[k]
 
     def percent(half: float) -> float:
-        return 100.0 * coordinate.spread(estimate.value, half) / abs(estimate.value)
+        # of a number that is zero: in percent of its prior's unit
+        size = abs(estimate.value) or coordinate.unit
+        return 100.0 * coordinate.spread(estimate.value, half) / size
 
     now = percent(float(ways.half_width[k]))
     best = ways.best(k)

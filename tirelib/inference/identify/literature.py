@@ -39,7 +39,7 @@ OF_PLAIN: Mapping[str, tuple[float, float, str]] = {
 _OFFSET_SLOPE = (
     0.0,
     0.03,
-    "0 of a belt that keeps its section; finite-element tires show -.018 on average, -.04 to 0",
+    "0 of a liner that keeps its thickness; finite-element tires show -.04 to 0",
 )
 """Value, standard deviation and source of the growth of the gages' offset with pressure."""
 _RADIAL = (1.0, 2.4e5)

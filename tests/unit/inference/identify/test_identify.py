@@ -80,6 +80,15 @@ def test_one_pressure_tells_no_slopes() -> None:
     assert "not_identifiable" in found["tangential_pressure_slope"].flags
 
 
+def test_one_pressure_tells_nothing_of_an_offset_that_goes_with_it() -> None:
+    runs = straight_runs(made_waves(pressures=(2.1e5,)))
+    (slope,) = (e for e in estimated(runs)[2] if e.name == "offset_pressure_slope")
+    assert slope.value == 0.0
+    assert slope.fit_std == pytest.approx(0.03, rel=1e-3), "the prior's"
+    assert "not_identifiable" in slope.flags
+    assert not re.search("inf|nan", slope.helps)
+
+
 def test_the_start_is_geometry_then_literature(runs: StraightRuns) -> None:
     start = start_file(header(), runs, None)
     pressure = float(np.mean(runs.waves.conditions["pressure"]))

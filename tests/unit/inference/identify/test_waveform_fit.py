@@ -301,6 +301,7 @@ def test_a_round_and_stiff_tread_is_not_taken_for_a_flat_and_soft_one(crown: flo
         tread_hardening=0.8,
         section_pull=0.03,
         liner_share=0.2,
+        offset_pressure_slope=-0.02,
         tread_poisson=0.1,
         contact_crown=crown,
         creep=0.003,
@@ -321,3 +322,7 @@ def test_a_round_and_stiff_tread_is_not_taken_for_a_flat_and_soft_one(crown: flo
         k = [c.name for c in PLAIN].index(name)
         error = np.log(float(fit.values[name]) / getattr(tire, name))
         assert abs(error) < 2.0 * deviation[k], name
+    k = [c.name for c in PLAIN].index("offset_pressure_slope")
+    found = float(fit.values["offset_pressure_slope"])
+    assert abs(found - -0.02) < 2.0 * PLAIN[k].unit * deviation[k]
+    assert deviation[k] < 0.5 * prior[k], "pressures of the campaign tell it"
