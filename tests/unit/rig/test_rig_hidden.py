@@ -193,4 +193,6 @@ def test_the_law_is_not_the_catalogues_but_kin_to_it(name: str) -> None:
     kinship = np.linalg.norm(rig @ basis) / np.linalg.norm(rig)
     assert 0.1 < kinship < 0.999
     if len(tangents) == 1 and not HIDDEN[name].signed:
-        assert float(rig @ tangents[0]) > 0.0
+        # gages come loose under load and lose gain as they grow warm
+        side = -1.0 if name in ("gain_load", "gain_speed") else 1.0
+        assert side * float(rig @ tangents[0]) > 0.0
