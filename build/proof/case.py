@@ -43,8 +43,9 @@ def fingerprint() -> str:
         "random_effects",
     )
     files = [root / "inference" / "identify" / f"{name}.py" for name in names]
-    files += [root / "model" / f"{name}.py" for name in ("base", "chain", "solution", "state")]
-    files += [root / "model" / "rolled.py", *sorted((root / "physics" / "rolling").glob("*.py"))]
+    files += [root / "model" / f"{name}.py" for name in ("base", "chain", "solution")]
+    files += [root / "model" / "rolled.py", root / "effects" / "state.py"]
+    files += sorted((root / "physics" / "rolling").glob("*.py"))
     return _hash(*files, Path(__file__), *_LABORATORY)
 
 

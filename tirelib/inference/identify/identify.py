@@ -269,11 +269,11 @@ def estimate(fit: WaveformFit, k: int, start: TireFile) -> Estimate:
     name = coordinate.name
     value = float(fit.values[name])
     fit_std = coordinate.spread(value, float(np.sqrt(fit.covariance[k, k])))
-    structure = coordinate.spread(value, float(structure_std(start, fit.free)[k]))
-    low, high = (float(coordinate.moved(value, step)) for step in fit.interval[k])
-    low, high = min(low, high), max(low, high)
-    low = value - float(np.hypot(value - low, 1.96 * structure))
-    high = value + float(np.hypot(high - value, 1.96 * structure))
+    apart = float(structure_std(start, fit.free)[k])
+    structure = coordinate.spread(value, apart)
+    # both parts are normal in the coordinate: a number that moves by a factor is off by one
+    steps = np.array([-1.0, 1.0]) * np.hypot(fit.interval[k], 1.96 * apart)
+    low, high = sorted(float(coordinate.moved(value, step)) for step in steps)
     prior = coordinate.spread(start.numbers[name].value, float(fit.prior_std[k]))
     untold, wide = fit_std > TOLD * prior, 0.5 * (high - low) > WIDEST * abs(value)
     far = abs(value - start.numbers[name].value) > 2.5 * prior

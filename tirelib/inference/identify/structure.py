@@ -19,12 +19,12 @@ STRUCTURE_STD: Mapping[str, float] = MappingProxyType(
         "tangential_stiffness": 0.07,
         "tread_stiffness": 0.07,
         "innerliner_offset": 0.013,
-        "radial_pressure_slope": 0.035,
+        "radial_pressure_slope": 0.06,
         "tangential_pressure_slope": 0.45,
-        "extension_stiffness": 0.055,
-        "shear_stiffness": 0.08,
+        "extension_stiffness": 0.06,
+        "shear_stiffness": 0.17,
         "rotary_inertia": 1.0,
-        "tread_shear_stiffness": 0.3,
+        "tread_shear_stiffness": 0.4,
         "tread_hardening": 0.6,
         "section_pull": 0.5,
         "liner_share": 1.0,
@@ -36,7 +36,8 @@ STRUCTURE_STD: Mapping[str, float] = MappingProxyType(
         "centrifugal_tension": 0.01,
     }
 )
-"""Relative standard deviation by parameter, in units of the value (slopes: of a typical slope)."""
+"""Standard deviation by parameter: of the logarithm of the value, or in units of the value (slopes:
+of a typical slope)."""
 
 WITHOUT_SHEAR: Mapping[str, float] = MappingProxyType(
     {
