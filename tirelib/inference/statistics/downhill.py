@@ -17,8 +17,6 @@ GOOD = 0.5
 """Share below which the next step is damped."""
 FIRST = 0.1
 """Damping to begin with, relative to the curvature by each coordinate."""
-LONGEST = 1.0
-"""Longest move of a coordinate in one step."""
 HARDEST = 1e4
 """Damping at which there is no way down."""
 
@@ -39,26 +37,32 @@ class Lower:
 
 
 def downhill(
-    problem: Model, here: Quadratic, point: Point, solved: Any, whiten: Whiten, damping: float
+    problem: Model,
+    here: Quadratic,
+    point: Point,
+    solved: Any,
+    whiten: Whiten,
+    damping: float,
+    own: float | FloatArray = 0.0,
 ) -> Lower | None:
     """Return a point whose cost is lower as promised, by ever shorter steps; None if none is.
 
-    A law may end where its range does. Where a step has no solution, one is tried that stays within
+    The damping is that of all coordinates, and each has its `own` (n_coordinates,) beside it. A law
+    may end where its range does. Where a step has no solution, one is tried that stays within
     the ranges of strengths.
     """
     inside = _inside(here, point)
     parabolas = (here, inside) if (inside.step() != here.step()).any() else (here,)
     while damping < HARDEST:
-        for dz in (each.step(damping) for each in parabolas):
-            share = LONGEST / max(LONGEST, float(np.abs(dz).max()))
-            tried = _tried(problem, point, share * dz, solved)
+        for dz in (each.step(damping + own) for each in parabolas):
+            tried = _tried(problem, point, dz, solved)
             if tried is None:
                 continue
             rest = whiten(tried[1].rest)
             cost = here.cost_at(tried[0].coordinates, rest)
-            promised = share * here.fall(dz)
+            promised = here.fall(dz)
             if here.cost - cost > LEAST_FALL * promised:
-                moved = share * float(np.abs(dz / here.deviation).max())
+                moved = float(np.abs(dz / here.deviation).max())
                 good = here.cost - cost >= GOOD * promised
                 after = 0.1 * damping if good else max(damping, FIRST)
                 return Lower(*tried, rest, cost, moved, after)

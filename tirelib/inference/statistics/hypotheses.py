@@ -121,7 +121,7 @@ class Hypotheses:
         further = next(k for k, name in enumerate(rival.names) if name not in hypothesis.names)
         ratio = min(hypothesis.unnamed - rival.exact, 0.0)
         p = self._count(hypothesis) * float(np.exp(ratio))
-        if max(p, rival.p_plain(further)) > self.false_alarm:
+        if max(p, rival.exact_plain[further]) > self.false_alarm:
             return hypothesis
         out = replace(hypothesis, rival=" and ".join(self.added(rival)), p_rival=p)
         self._made[frozenset(self.added(hypothesis))] = out

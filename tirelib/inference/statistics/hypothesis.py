@@ -59,6 +59,11 @@ class Hypothesis:
         Largest log likelihood with exact laws, [nats].
     further : mapping of name to float
         The same with each further effect, to first order, [nats].
+    unnamed : float
+        Largest log likelihood with something without a name beside these effects, roughly right
+        laws or exact ones, [nats]. It is more of a group of smooth shapes than plain tires have.
+    exact_plain : tuple of float
+        `p_plain` of each effect with exact laws.
     rival : str
         Effects of a hypothesis of as many effects that is likelier; empty where there is none.
     p_rival : float
@@ -77,6 +82,8 @@ class Hypothesis:
     likelihood: float
     exact: float
     further: Mapping[str, float]
+    unnamed: float
+    exact_plain: tuple[float, ...]
     rival: str = ""
     p_rival: float = 1.0
     p_beside: float = 0.0
@@ -107,15 +114,6 @@ class Hypothesis:
         return self.null.names[int(np.argmax(self.null.scores))]
 
     @property
-    def unnamed(self) -> float:
-        """Largest log likelihood with these effects and something without a name, [nats].
-
-        It is more of a group of smooth shapes than plain tires have.
-        """
-        without = max(null.likelihood for null in self.nulls)
-        return self.likelihood + max(null.unnamed for null in self.nulls) - without
-
-    @property
     def p(self) -> float:
         """p-value of the hypothesis: of the statistic, or of its rival if that is smaller.
 
@@ -140,15 +138,7 @@ class Hypothesis:
         By chi-squared of its strength, whose variance is that of the fit with roughly right laws
         and that of plain tires; the largest over the families.
         """
-        name, place, p = self.names[index], self.fit.place(index), 0.0
-        for null in self.nulls:
-            weighed, size = null.likeliest, null.size.of(name)
-            strength = weighed.mean(weighed.normal.right)[place]
-            left = strength - size * null.family.means.get(name, 0.0)
-            shown = size**2 * null.shown.get(name, 0.0) * np.eye(left.size)
-            square = left @ np.linalg.solve(weighed.covariance[place, place] + shown, left)
-            p = max(p, float(chi2.sf(square, left.size)))
-        return p
+        return _p_plain(self.nulls, self.fit, index)
 
     def gain(self, name: str) -> float:
         """Return by how much a further effect with an exact law raises `exact`, to first order.
@@ -197,7 +187,7 @@ def judged(
         laws = max(found, key=lambda laws: found[laws][0])
     without = _each(fit, 0.0)
     exact, at = _likeliest(views, fit, families, without)
-    gained = [_null(at, fit, family, without).gained for family in families]
+    sharp = [_null(at, fit, family, without) for family in families]
     loosest = _each(fit, LOOSEST)
     likeliest = sorted(alike, key=lambda laws: -found[laws][0])
     looseness = np.inf
@@ -210,9 +200,30 @@ def judged(
             looseness = max((*each, LAWS[-1])) / LAWS[-1]
             break
     likelihood = max(exact, found[laws][0])
-    further = {name: max(each[name] for each in gained) for name in gained[0]}
+    further = {name: max(null.gained[name] for null in sharp) for name in sharp[0].gained}
+    unnamed = max(likelihood + _unnamed(kept[0]), exact + _unnamed(sharp))
+    small = tuple(_p_plain(sharp, fit, k) for k in range(len(fit.effects)))
     inside = plausible(fit, own_effects)
-    return Hypothesis(fit, *kept, looseness, inside, likelihood, exact, further)
+    return Hypothesis(fit, *kept, looseness, inside, likelihood, exact, further, unnamed, small)
+
+
+def _unnamed(nulls: Sequence[Null]) -> float:
+    """Return by how much something without a name raises the log likelihood, [nats]."""
+    without = max(null.likelihood for null in nulls)
+    return max(null.unnamed for null in nulls) - without
+
+
+def _p_plain(nulls: Sequence[Null], fit: Posterior, index: int) -> float:
+    """Return the p-value of an effect that is as large as plain tires show it, by these tests."""
+    name, place, p = fit.names[index], fit.place(index), 0.0
+    for null in nulls:
+        weighed, size = null.likeliest, null.size.of(name)
+        strength = weighed.mean(weighed.normal.right)[place]
+        left = strength - size * null.family.means.get(name, 0.0)
+        shown = size**2 * null.shown.get(name, 0.0) * np.eye(left.size)
+        square = left @ np.linalg.solve(weighed.covariance[place, place] + shown, left)
+        p = max(p, float(chi2.sf(square, left.size)))
+    return p
 
 
 def _vague(fit: Posterior) -> list[int]:

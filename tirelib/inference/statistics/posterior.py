@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.core.arrays import FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import ConvergenceError
 from tirelib.effects import Effect
-from tirelib.inference.statistics.downhill import Whiten, downhill
+from tirelib.inference.statistics.downhill import FIRST, Whiten, downhill
 from tirelib.inference.statistics.normal import LEAST_VARIANCE, Normal, Weighed, blocks_of
 from tirelib.inference.statistics.plain import BASE, ROUGHLY, View
 from tirelib.inference.statistics.problem import Model, Point, Problem
@@ -37,6 +37,9 @@ STILL = 0.1
 IDLE = 4
 """Steps in a row that bring less than `SETTLED`, whatever they promise, after which a fit has
 settled: where a tread begins to slide, a slope holds on one side only and promises too much."""
+PATIENT = 20
+"""Steps after which each coordinate is damped by itself: few fits take as many, and those that do
+have met a kink."""
 FAR, LOOSE = 10.0, 0.03
 """A model that leaves more than `FAR` of what noise leaves is settled by steps that bring less than
 `LOOSE` of that surplus: it lacks something strong, and how near it comes to the runs without that
@@ -223,6 +226,7 @@ def posterior(
     whitened, rest = _white(whiten, problem.remainder(point, solved)), whiten(solved.rest)
     asked = slice(len(point.base), len(width) - sum(e.components for e in others))
     idle, moved = 0, np.inf
+    last, own = np.zeros(len(width)), np.zeros(len(width))
     for count in range(MOST_STEPS):
         if follow is not None and 0 < count <= WHITENING_STEPS and moved > WHITENING_MOVE:
             whiten = follow(solved)
@@ -235,13 +239,17 @@ def posterior(
         little = settled * unit
         there = promised < little
         there = there and bool((np.abs(dz[asked]) < STILL * here.deviation[asked]).all())
-        lower = None if there else downhill(problem, here, point, solved, whiten, damping)
+        lower = None if there else downhill(problem, here, point, solved, whiten, damping, own)
         if lower is None:
             # the bottom, or its edge: slopes of a point nearby do not tell
             if exact:
                 break
             slopes, exact, damping = problem.slopes(point, solved), True, 0.0
             continue
+        move = lower.point.coordinates - point.coordinates
+        if count >= PATIENT:
+            own = _own_damping(own, move * last < 0.0)
+        last = move
         point, solved, rest = lower.point, lower.solved, lower.rest
         moved, damping = lower.moved, lower.damping
         brings = max(little, SETTLED * unit, LOOSE * (cost - FAR * rest.size))
@@ -279,6 +287,15 @@ def posterior(
         bool(cost > FAR * rest.size),
         problem.lookalike,
     )
+
+
+def _own_damping(own: FloatArray, turned: BoolArray) -> FloatArray:
+    """Return each coordinate's own damping, more of it where its last step has turned round.
+
+    A coordinate whose cost has a kink, as a crown whose strips meet the road one after the other,
+    goes to and fro over it, and would hold all others back.
+    """
+    return np.where(turned, np.maximum(10.0 * own, FIRST), 0.5 * own)
 
 
 def explaining(

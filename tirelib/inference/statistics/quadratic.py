@@ -10,6 +10,8 @@ from tirelib.inference.statistics.bounded import bounded_step
 from tirelib.inference.statistics.normal import Normal, Weighed
 from tirelib.inference.statistics.plain import BASE
 
+LONGEST = 1.0
+"""Longest move of a coordinate in one step."""
 Ends = tuple[FloatArray, FloatArray]
 """Least and largest value of each coordinate, (n_coordinates,) each."""
 
@@ -79,11 +81,16 @@ class Quadratic:
             cost_of(metric, normal.right, normal.square, here, widths),
         )
 
-    def step(self, damping: float = 0.0) -> FloatArray:
-        """Return the step to the bottom, damped relative to the curvature by each coordinate."""
-        gram = self.gram + damping * np.diag(np.diag(self.gram))
+    def step(self, damping: float | FloatArray = 0.0) -> FloatArray:
+        """Return the step to the bottom, damped relative to the curvature by each coordinate.
+
+        One damping serves all coordinates, or each has its own, (n_coordinates,). None moves by
+        more than `LONGEST`: one that would go far does not shorten the way of the others.
+        """
+        gram = self.gram + np.diag(damping * np.diag(self.gram))
         low, high = self.ends
-        return bounded_step(gram, self.gradient, low - self.here, high - self.here)
+        low, high = np.maximum(low - self.here, -LONGEST), np.minimum(high - self.here, LONGEST)
+        return bounded_step(gram, self.gradient, low, high)
 
     def fall(self, dz: FloatArray) -> float:
         """Return by how much a step lowers the parabola."""

@@ -10,7 +10,7 @@ from tests.unit.inference.statistics.linear_problem import EFFECTS, N, Toy, by_e
 from tirelib.core.arrays import FloatArray
 from tirelib.inference.statistics import select as select_
 from tirelib.inference.statistics.hypotheses import Hypotheses
-from tirelib.inference.statistics.hypothesis import LAWS, Hypothesis
+from tirelib.inference.statistics.hypothesis import LAWS
 from tirelib.inference.statistics.problem import Point
 from tirelib.inference.statistics.select import select
 
@@ -84,20 +84,17 @@ def test_a_true_hypothesis_seldom_gives_way_to_one_effect_more(law: float) -> No
     assert sum(each != (("twist",),) for each in found) <= 2  # upper 99 % bound of 5 % of 8
 
 
-def test_one_effect_more_is_not_there_if_plain_tires_show_as_much_of_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_one_effect_more_is_not_there_if_plain_tires_show_as_much_of_it() -> None:
     among = Hypotheses(planted(3, twist=1.0, bend=COVERED), FAMILIES)
     alone, both = among.at(["twist"]), among.at(["twist", "bend"])
     assert alone is not None
     assert both is not None
     assert among.against_larger(alone).rival
-
-    def plain(self: Hypothesis, index: int) -> float:
-        return 1.0
-
-    monkeypatch.setattr(Hypothesis, "p_plain", plain)
-    assert among.against_larger(alone) is alone
+    further = both.names.index("bend")
+    for p, gives_way in ((0.04, True), (0.06, False)):
+        small = tuple(p if k == further else 0.0 for k in range(2))
+        among._made[frozenset(both.names)] = replace(both, exact_plain=small)
+        assert bool(among.against_larger(alone).rival) is gives_way
 
 
 def test_one_effect_more_has_to_be_likelier_than_something_without_a_name() -> None:

@@ -8,6 +8,7 @@ from scipy import optimize
 
 from tests.unit.inference.statistics.linear_problem import (
     EFFECTS,
+    LEAST_OWN,
     Louder,
     N,
     Solved,
@@ -15,10 +16,13 @@ from tests.unit.inference.statistics.linear_problem import (
     drawn,
     family,
 )
+from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.inference.statistics.bounded import bounded_step
+from tirelib.inference.statistics.plain import BASE
 from tirelib.inference.statistics.posterior import SETTLED, posterior
 from tirelib.inference.statistics.problem import Point
+from tirelib.inference.statistics.quadratic import LONGEST, Quadratic
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 SPREAD = FAMILIES[0].shown()
@@ -62,6 +66,43 @@ def test_where_a_law_ends_the_other_numbers_are_fitted_all_the_same() -> None:
     alone = posterior(Ending(measured), [], {}, Louder(0.001))
     assert fit.strengths[0] == pytest.approx([0.0], abs=1e-9)
     assert fit.cost == pytest.approx(alone.cost, abs=SETTLED)
+
+
+class Kinked(Toy):
+    """A base whose first number costs as |z| does, and whose second one has far to go."""
+
+    DEPTH, FAR = 10.0, 50.0
+
+    def __init__(self) -> None:
+        super().__init__(np.zeros(N))
+        self.living = ()
+        self.base = np.linalg.qr(self.base.T)[0].T
+        self.shapes = 1e-6 * self.shapes
+        self.start = Point(np.array([0.3, 0.0, 0.0]))
+
+    def solve(self, point: Point, near: Any = None) -> Solved:
+        z = point.base
+        away = np.array([self.DEPTH * (1.0 + abs(z[0])), z[1] - self.FAR, z[2]])
+        return Solved(-away @ self.base)
+
+    def slopes(self, point: Point, solved: Any, *, near: bool = False) -> FloatArray:
+        side = 1.0 if point.base[0] >= 0.0 else -1.0
+        return np.array([[side * self.DEPTH], [1.0], [1.0]]) * self.base
+
+
+def test_a_number_whose_cost_has_a_kink_does_not_hold_the_others_back() -> None:
+    toy = Kinked()
+    fit = posterior(toy, (), {"smooth, all": 1e-6, "smooth, there": 1e-6}, toy.whitener(LEAST_OWN))
+    there = Kinked.FAR / (1.0 + toy.widths[1] ** -2)
+    assert fit.point.base == pytest.approx([0.0, there, 0.0], abs=0.6)
+
+
+def test_a_number_that_would_go_far_does_not_shorten_the_way_of_the_others() -> None:
+    rows = np.eye(2, 6)
+    rest = np.array([40.0, 0.5, 0.0, 0.0, 0.0, 0.0])
+    open_ = np.full(2, -np.inf), np.full(2, np.inf)
+    here = Quadratic.about({BASE: rows}, rest, np.zeros(2), np.full(2, 1e3), {}, open_)
+    assert here.step() == pytest.approx([LONGEST, 0.5], rel=1e-5)
 
 
 def test_a_step_between_ends_is_the_bottom_there() -> None:

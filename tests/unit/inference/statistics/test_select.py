@@ -255,7 +255,9 @@ def test_more_effects_that_are_not_likelier_do_not_show_that_they_are_there(
     def dearer(self: Hypotheses, problem: Any, fit: Posterior) -> Hypothesis:
         """Return a hypothesis of so many effects as one that explains all, but is less likely."""
         h = tested(self, problem, fit)
-        return replace(h, likelihood=h.likelihood - 1e4) if len(fit.effects) >= least else h
+        if len(fit.effects) < least:
+            return h
+        return replace(h, likelihood=h.likelihood - 1e4, unnamed=h.unnamed - 1e4)
 
     named = select(toy, FAMILIES)
     assert named.kind == "named"
@@ -277,6 +279,33 @@ def test_a_hypothesis_is_as_likely_as_with_laws_that_are_exact() -> None:
     found = [Hypotheses(problem, FAMILIES).at(["bend"]) for problem in (toy, exact)]
     roughly, exactly = (h.likelihood for h in found if h is not None)
     assert roughly == pytest.approx(exactly, abs=0.1)
+
+
+class Costly(Toy):
+    """A strong law that may be off in many ways, one of which is a group of smooth shapes."""
+
+    def __init__(self, measured: FloatArray, *, exact: bool) -> None:
+        super().__init__(measured)
+        self.by["bend"] = 10.0 * self.by["bend"]
+        ways = np.random.default_rng(5).standard_normal((40, N)) / 5.0
+        self.ways = 10.0 * np.concatenate([self.shapes, ways])
+        self.living = tuple(replace(effect, exact=exact) for effect in self.living)
+
+    def roughly(
+        self, point: Point, solved: Any, slopes: FloatArray, count: int
+    ) -> list[FloatArray]:
+        return [np.linalg.norm(size) * self.ways for size in point.ranges[:count]]
+
+
+def test_something_without_a_name_may_stand_beside_exact_laws() -> None:
+    """It is no less likely beside a law that may be off, which could be exact as well."""
+    found = []
+    for exact in (False, True):
+        toy = Costly(drawn(np.random.default_rng(32)), exact=exact)
+        toy.measured = toy.measured + toy.by["bend"][0] + 6.0 * toy.shapes[0]
+        found.append(Hypotheses(toy, FAMILIES).at(["bend"]))
+    roughly, exactly = (h.unnamed for h in found if h is not None)
+    assert roughly >= exactly - 0.1
 
 
 class Valleys(Toy):
