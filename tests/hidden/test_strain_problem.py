@@ -143,6 +143,11 @@ def test_whitening_is_the_inverse_of_noise_and_set_points(problem: StrainProblem
     whiten = Whitener.of(
         wave, tangent, scale, problem.half_angle[:2], points, low_pass, noise=noise, own=0.0
     )
+    # the volume is that of the runs, each by itself
+    spread = whiten.lower @ whiten.lower.swapaxes(1, 2)
+    assert whiten.log_volume == pytest.approx(-0.5 * np.linalg.slogdet(spread)[1].sum())
+    parts = [whiten.take(slice(run, run + 1)).log_volume for run in range(2)]
+    assert whiten.log_volume == pytest.approx(sum(parts))
     count = 3000
     # white before the filter, as the noise of a transmitter is
     order = np.fft.rfftfreq(GRID.size, 1.0 / GRID.size)
