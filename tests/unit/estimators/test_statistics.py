@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tirelib.core.units import from_si
+from tirelib.estimators.crossval import FACTOR, LEVELS, REPORT_UNIT
 from tirelib.estimators.floor import with_floor
 from tirelib.estimators.folds import held_out_folds
 from tirelib.estimators.least_squares import least_squares
@@ -79,3 +81,11 @@ def test_the_floor_is_how_the_turns_of_a_run_scatter_about_its_mean(
     runs = loads.groupby(observed.unit[rows])
     pooled = (runs.var() * (runs.count() - 1)).sum() / (runs.count() - 1).sum()
     assert floored.floor == pytest.approx(np.sqrt(pooled))
+
+
+def test_errors_at_held_out_levels_are_told_in_the_units_that_they_name() -> None:
+    dimension = {"N": "force", "deg": "angle", "1": "ratio", "bar": "pressure", "km/h": "speed"}
+    named = {*REPORT_UNIT.values(), *(unit for _, unit in LEVELS.values())}
+    assert named == set(FACTOR)
+    for unit, factor in FACTOR.items():
+        assert factor == pytest.approx(from_si(1.0, unit, dimension[unit]))
