@@ -10,7 +10,7 @@ from hidden.cases import load_case
 from tirelib.core.arrays import FloatArray
 from tirelib.effects import CATALOGUE
 from tirelib.inference.identify.campaign_data import straight_runs
-from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.identify import fitted
 from tirelib.inference.identify.literature import literature
 from tirelib.inference.identify.random_effects import scales, tangents
 from tirelib.inference.problems.strain import StrainProblem
@@ -29,7 +29,7 @@ OWN = 0.001
 def problem() -> StrainProblem:
     case = load_case(CASE)
     runs = straight_runs(case.waves.take(~case.held_out))
-    return StrainProblem(runs, estimated(runs)[1].values, list(CATALOGUE.values()))
+    return StrainProblem(runs, fitted(runs)[1].values, list(CATALOGUE.values()))
 
 
 def test_a_narrow_prior_stands_where_it_comes_from(problem: StrainProblem) -> None:
