@@ -162,3 +162,13 @@ def test_a_period_that_cannot_be_true_is_damage(period: int) -> None:
     batches = decoder.push(b"".join(encode(good) + encode(bad) + encode(good)))
     assert sum(len(batch) for batch in batches) == 2
     assert decoder.counts.framing == 1
+
+
+def test_what_follows_an_interruption_in_the_middle_of_a_frame_is_no_damage() -> None:
+    wire = encode(some_frames(6, 1))
+    decoder = SerialDecoder()
+    whole = decoder.push(b"".join(wire[:2]) + wire[2][:40])
+    decoder.interrupt()
+    whole += decoder.push(wire[3][60:] + b"".join(wire[4:]))  # it comes back within another frame
+    assert sum(map(len, whole)) == 4
+    assert (decoder.counts.ok, decoder.counts.bad) == (4, 0)

@@ -18,14 +18,14 @@ from tests.bench.test_slcan import Keep, keys, some_frames
 from tirebench.deadline import Deadline
 from tirebench.errors import DeviceError, LinkError, UnpluggedError
 from tirebench.links import BACK, LOST, Link, Read
-from tirebench.links.can_bus import CanLink, message_of
+from tirebench.links.can_bus import CanLink, message_of, packed
 from tirebench.links.opening import PortPlan
 from tirebench.links.pseudo import PseudoTerminal
 from tirebench.links.reconnecting import ReconnectingLink
 from tirebench.links.serial_port import MUCH, NAP, SerialLink
 from tirebench.links.slcan_port import SlcanLink
 from tirebench.protocols.slcan import SlcanDecoder, encode
-from tirebench.wire.can_batch import CanBatch, same_kind, unpack
+from tirebench.wire.can_batch import FD_LENGTHS, CanBatch, same_kind, unpack
 from tirebench.wire.line_counts import LineCounts
 
 CANNOT = {
@@ -219,6 +219,17 @@ def test_frames_of_a_virtual_bus_arrive_packed_and_in_order() -> None:
     link.close()
 
 
+@pytest.mark.parametrize("length", FD_LENGTHS.tolist())
+def test_a_frame_of_any_length_keeps_its_bytes(length: int) -> None:
+    data = bytes(range(1, length + 1))
+    sent = can.Message(arbitration_id=0x123, data=data, is_fd=length > 8, is_extended_id=False)
+    short = can.Message(arbitration_id=0x124, data=data[:3], is_extended_id=False)
+    for others in ([], [short]):
+        batch = packed([sent, *others])
+        assert bytes(message_of(batch, 0).data) == data
+        assert [bytes(message_of(batch, 1).data) for _ in others] == [data[:3] for _ in others]
+
+
 def serve(server: socket.socket, frames: list[tuple[int, bytes]], heard: threading.Event) -> None:
     """A socketcand server that knows just enough, and then hangs up."""
     connection, _ = server.accept()
@@ -382,4 +393,31 @@ def test_attempts_lie_farther_and_farther_apart(monkeypatch: pytest.MonkeyPatch)
         np.diff(failing.opened), [0.1, 0.2, 0.4, 0.8, 1.6, 2.0, 2.0], atol=2e-3
     )
     assert link.overruns() == 6
+    link.close()
+
+
+class Leaving(Failing):
+    """A link that opens at once, and goes away as soon as it is read, a few times."""
+
+    def open(self) -> "Leaving":
+        self.opened.append(self._clock.monotonic())
+        return self
+
+    def receive(self, deadline: Deadline) -> Read | None:
+        if len(self.opened) <= self.left:
+            raise UnpluggedError("gone")
+        return Read(0, b"x")
+
+
+@pytest.mark.parametrize("times", [0, 1, 4])
+def test_overruns_of_every_connection_are_counted(
+    times: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = Clock()
+    for module in ("tirebench.links.reconnecting", "tirebench.deadline"):
+        monkeypatch.setattr(f"{module}.time", clock)
+    link = ReconnectingLink(Leaving(times, clock).open, 60.0)
+    for _ in range(times):
+        assert events_of(link, 60.0, BACK)[0] == [LOST, BACK]
+    assert link.overruns() == 3 * (1 + times)
     link.close()

@@ -136,24 +136,25 @@ def test_a_signal_is_found_wherever_a_dbc_puts_it(
     assert raw_values(data[None, :], [signal])[0, 0] == raw
 
 
+@pytest.mark.parametrize("tick", [1.0, 0.5, 20.0])
 @given(
     gaps=st.lists(st.integers(1, 60_000), min_size=1, max_size=12),
     jitter=st.floats(-0.2, 0.2),
     begin=st.integers(0, 2**24),
 )
 def test_numbers_and_times_are_widened_across_any_gap(
-    gaps: list[int], jitter: float, begin: int
+    tick: float, gaps: list[int], jitter: float, begin: int
 ) -> None:
-    """Gaps of up to 36 s: two turns of the clock and 234 of the number."""
+    """Gaps of up to 36 s: two to four turns of the clock and 234 of the number."""
     number = np.concatenate(([0], np.cumsum(gaps)))
-    wide = Widener(600.0)
+    wide, frame = Widener(600.0, tick=tick), round(600.0 / tick)
     for place in range(len(number)):
         n = int(number[place])
         arrival = round(1e9 * (0.6e-3 * n + 1.0 + jitter * (place % 2)))
-        time = begin + 600 * n
+        time = begin + frame * n
         seq, t_us = wide.widen(np.array([n % 256]), np.array([time % 2**24]), arrival)
         assert seq[0] == n % 2**16
-        assert (t_us[0] - begin % 2**24 - 600 * n) % 2**32 == 0
+        assert (t_us[0] - round(tick * (begin % 2**24)) - 600 * n) % 2**32 in (0, 1, 2**32 - 1)
 
 
 def record_of(samples: int, wheel: int = 0, period: int = 1000) -> Record:
@@ -240,6 +241,10 @@ def test_foreign_frames_are_counted_and_left_alone() -> None:
     odd = same_kind(0x120, np.zeros((2, 7), np.uint8), fd=False)
     assert decoder.push(joined([other, odd]), 0) == []
     assert (counts.ok, counts.unknown) == (0, 5)
+    own = same_kind(0x120, layouts.encode_raw16(some_raw(RAW16, 4, 1)), fd=True)
+    decoder.push(own, 0)
+    decoder.push(joined([own, other]), 0)
+    assert (counts.ok, counts.unknown) == (8, 8)
 
 
 @given(seed=st.integers(0, 10**6), fd=st.booleans(), count=st.integers(0, 9))

@@ -228,12 +228,15 @@ def test_no_turn_of_a_wheel_is_told_before_its_rate_is_judged_and_none_is_lost(f
     link: Any = Reads(wrong_clock(frames), good)
     chain = ReplayChain(link, wheels, Estimation(lambda _: Turns(), Conditions.constant()))
     told: list[Turn] = []
+    alarms: list[str] = []
     while not chain.ended:
         news = chain.poll(Deadline.never())
         told += news.turns
+        alarms += news.alarms
         assert not told or wheels.judged == {0, 1}
     told += chain.finish("end").turns
     judged = frames >= JUDGED
+    assert ["9709 samples a second" in text for text in alarms] == [True] * judged  # told once
     assert [turn.wheel for turn in told].count(1) == 16 * frames // 1000
     assert [turn.wheel for turn in told].count(0) == (0 if judged else 16 * frames // 1000)
 

@@ -111,6 +111,25 @@ def test_a_time_reset_is_acted_on_once_and_may_be_announced_often() -> None:
     assert (timeline.counts.gaps, timeline.counts.resets) == (0, 1)
 
 
+def test_a_pause_that_the_wheel_announces_is_the_time_in_which_it_sent_nothing() -> None:
+    timeline = Timeline(Device())
+    for number in range(3):  # four frames, then two seconds of silence
+        frames = line_of(4, seq=4 * number, t_us=number * (4 * 1600 + 2_000_000))
+        flags = np.where(np.arange(4) == 0, int(FrameFlag.TIME_RESET), 0)
+        timeline.push(replace(frames, flags=flags))
+    assert timeline.counts.resets == 2
+    assert timeline.paused == pytest.approx(4.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("error", [-5e-4, 0.0, 5e-4])
+def test_what_is_lost_is_counted_though_the_clock_is_a_little_off(error: float) -> None:
+    timeline = Timeline(Device())
+    blocks = push(timeline, paced(300, error), [k for k in range(300) if not 100 <= k < 130])
+    assert timeline.counts.lost_frames == 30
+    assert timeline.counts.lost_samples == 30 * 16
+    assert joined(blocks).size == 300 * 16
+
+
 def test_a_transmitter_that_restarts_begins_a_segment_and_time_does_not_go_back() -> None:
     timeline = Timeline(Device())
     first = push(timeline, line_of(200, seq=5000, t_us=9_000_000))

@@ -11,7 +11,7 @@ from tirelib.campaign import read_campaign
 from tirelib.effects import CATALOGUE
 from tirelib.inference.diagnose.diagnose import Diagnosis, diagnose
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
-from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.identify import fitted
 from tirelib.measured.waveforms import measure_waveforms
 
 DATA = Path(__file__).parent / "data"
@@ -20,7 +20,7 @@ DATA = Path(__file__).parent / "data"
 def twice(runs: StraightRuns) -> tuple[Diagnosis, Diagnosis]:
     """Return the diagnosis of the base, and that of the model which it ends with."""
     catalogue = list(CATALOGUE.values())
-    first = diagnose(runs, estimated(runs)[1].values, catalogue)
+    first = diagnose(runs, fitted(runs)[1].values, catalogue)
     model = first.final
     second = diagnose(
         runs,

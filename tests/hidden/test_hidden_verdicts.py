@@ -8,7 +8,7 @@ from hidden.cases import load_case
 from tirelib.effects import CATALOGUE
 from tirelib.inference.diagnose.diagnose import diagnose
 from tirelib.inference.identify.campaign_data import straight_runs
-from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.identify import fitted
 
 DATA = Path(__file__).parent / "data"
 
@@ -17,7 +17,7 @@ def test_where_nothing_is_hidden_nothing_is_named() -> None:
     """That the belt of this tire shears is a number of the base."""
     case = load_case(DATA / "1700-belt_shear-1.50.npz")
     runs = straight_runs(case.waves.take(~case.held_out))
-    told = diagnose(runs, estimated(runs)[1].values, list(CATALOGUE.values()))
+    told = diagnose(runs, fitted(runs)[1].values, list(CATALOGUE.values()))
     assert (told.verdict.kind, told.named) == ("none", ())
     assert told.verdict.base.p > 0.05
 

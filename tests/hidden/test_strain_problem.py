@@ -10,7 +10,7 @@ from hidden.cases import load_case
 from tirelib.core.arrays import FloatArray
 from tirelib.effects import CATALOGUE
 from tirelib.inference.identify.campaign_data import straight_runs
-from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.identify import fitted
 from tirelib.inference.identify.literature import literature
 from tirelib.inference.identify.random_effects import scales, tangents
 from tirelib.inference.problems.strain import StrainProblem
@@ -29,7 +29,7 @@ OWN = 0.001
 def problem() -> StrainProblem:
     case = load_case(CASE)
     runs = straight_runs(case.waves.take(~case.held_out))
-    return StrainProblem(runs, estimated(runs)[1].values, list(CATALOGUE.values()))
+    return StrainProblem(runs, fitted(runs)[1].values, list(CATALOGUE.values()))
 
 
 def test_a_narrow_prior_stands_where_it_comes_from(problem: StrainProblem) -> None:
@@ -143,6 +143,11 @@ def test_whitening_is_the_inverse_of_noise_and_set_points(problem: StrainProblem
     whiten = Whitener.of(
         wave, tangent, scale, problem.half_angle[:2], points, low_pass, noise=noise, own=0.0
     )
+    # the volume is that of the runs, each by itself
+    spread = whiten.lower @ whiten.lower.swapaxes(1, 2)
+    assert whiten.log_volume == pytest.approx(-0.5 * np.linalg.slogdet(spread)[1].sum())
+    parts = [whiten.take(slice(run, run + 1)).log_volume for run in range(2)]
+    assert whiten.log_volume == pytest.approx(sum(parts))
     count = 3000
     # white before the filter, as the noise of a transmitter is
     order = np.fft.rfftfreq(GRID.size, 1.0 / GRID.size)

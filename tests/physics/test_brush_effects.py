@@ -196,6 +196,37 @@ def test_laws_of_load_and_pressure_change_nothing_at_the_reference(
         np.testing.assert_allclose(found, wanted, rtol=1e-12)
 
 
+@pytest.mark.parametrize("name", [n for n in CATALOGUE if n.startswith("stiffness_")])
+def test_what_stiffens_the_bristles_stiffens_them_along_as_across(name: str) -> None:
+    effect = CATALOGUE[name]
+    strength = 0.3 if effect.components == 1 else (0.3, 0.2)
+    changed = effect.at(strength)[1](state())
+    assert np.ptp(changed.c_py) > 0.0
+    np.testing.assert_allclose(changed.c_px / state().c_px, changed.c_py / state().c_py)
+
+
+@pytest.mark.parametrize("name", DRIFTS)
+def test_a_drift_is_a_rise_over_the_campaign_and_a_bow_that_takes_nothing_on_the_mean(
+    name: str,
+) -> None:
+    law, constant = CATALOGUE[name].at, "mu" if name.startswith("friction") else "c_py"
+    rise, bow = (
+        np.log(getattr(law(strength)[1](state()), constant) / getattr(state(), constant))
+        for strength in ((0.2, 0.0), (0.0, 0.2))
+    )
+    np.testing.assert_allclose(rise, 0.2 * (POINTS.order - 0.5), atol=1e-12)
+    assert np.trapezoid(bow, POINTS.order) == pytest.approx(0.0, abs=2e-4)
+    assert bow[[0, -1]] - bow.min() == pytest.approx(0.2, abs=1e-3)
+
+
+@pytest.mark.parametrize("degrees", [0.4, -0.7])
+def test_ply_steer_is_so_many_degrees_of_slip_angle(degrees: float) -> None:
+    forward = replace(POINTS, speed=np.abs(POINTS.speed))
+    turned = replace(forward, slip_angle=forward.slip_angle + np.deg2rad(degrees))
+    steered = forces(CATALOGUE["ply_steer"].at(degrees), at=forward)
+    np.testing.assert_allclose(steered, forces(at=turned), rtol=1e-12, atol=1e-9)
+
+
 def test_warmth_and_sliding_speed_lower_what_they_should() -> None:
     warm = replace(POINTS, temperature=np.full(len(POINTS), 373.15))
     for name, constant in (("stiffness_temperature", "c_px"), ("friction_temperature", "mu")):
@@ -298,7 +329,8 @@ def test_a_shaped_pressure_carries_what_each_bristle_carries(
 
 def test_a_vanishing_flatness_is_the_parabola_and_a_wild_one_is_refused() -> None:
     at = PointConditions(POINTS.load, POINTS.slip_angle, POINTS.slip_ratio)
-    yielding = replace(BRUSH, yaw_compliance=4e-5, lateral_compliance=3e-6, Fy_offset=20.0)
+    own = {"yaw_compliance": 4e-5, "lateral_compliance": 3e-6, "sliding_friction": 0.7}
+    yielding = replace(BRUSH, **own, Fy_offset=20.0)
     plain, near = predict_forces(yielding, at), predict_shaped(yielding, at, 1e-11)
     for name in FORCES:
         np.testing.assert_allclose(getattr(near, name), getattr(plain, name), atol=1e-6)

@@ -8,9 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tirelib.core.errors import ParameterError
+from tirelib.core.parameters import read_tire
 from tirelib.physics.contact.fourier import evaluate
 from tirelib.physics.ring.lateral import BeamConstants, LateralBelt, LateralDeflection, bend_belt
 from tirelib.physics.ring.lateral import infinite_beam as infinite
+from tirelib.physics.ring.ring import Ring
 
 R = 0.3
 BELT: dict[str, Any] = {
@@ -39,6 +41,14 @@ stiffness = st.floats(20.0, 2e4)
 pulls = st.floats(0.0, 3e4)
 springs = st.floats(5e4, 5e6)
 shears = st.one_of(st.just(np.inf), st.floats(3e3, 1e6))
+
+
+@pytest.mark.parametrize("pressure", [0.0, 1.6e5, 2.5e5])
+def test_the_beam_is_as_tense_as_the_hoop(pressure: float) -> None:
+    """A hoop of radius R under the line load p b carries N = p b R, across as along."""
+    tire = read_tire("table-6-1").tire
+    hoop = Ring.of(tire, pressure)
+    assert LateralBelt.of(tire, pressure).tension == pytest.approx(hoop.inflation * hoop.radius)
 
 
 @given(stiffness, pulls, springs, shears)

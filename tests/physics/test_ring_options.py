@@ -20,6 +20,7 @@ OPTIONS = {
     "shearable": {"shear_stiffness": 2e5},
     "both": {"extension_stiffness": 4e6, "shear_stiffness": 2e5},
     "rotary": {"extension_stiffness": 4e6, "shear_stiffness": 2e5, "rotary_inertia": 1e-4},
+    "pulled": {"extension_stiffness": 4e6, "shear_stiffness": 2e5, "tension": 800.0},
 }
 every_option = pytest.mark.parametrize("option", list(OPTIONS))
 
@@ -112,8 +113,11 @@ def test_rotary_inertia_acts_like_less_bending_stiffness(omega: float) -> None:
 
 
 @pytest.mark.parametrize("name", ["extension_stiffness", "shear_stiffness"])
-def test_the_stiff_limit_is_the_dissertations_ring_at_first_order(name: str) -> None:
-    ring = replace(RING, damping=0.04)
+@pytest.mark.parametrize("own", [{"damping": 0.04}, {"dashpots": 0.04}, {"tension": 800.0}])
+def test_the_stiff_limit_is_the_dissertations_ring_at_first_order(
+    name: str, own: dict[str, float]
+) -> None:
+    ring = replace(RING, **own)
     limit = compliance(ring, 59.0, 30)
     error = [
         difference(compliance(replace(ring, **{name: stiff}), 59.0, 30), limit)

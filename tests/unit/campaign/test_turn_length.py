@@ -5,7 +5,7 @@ import pytest
 
 from tests.synthetic import header
 from tirelib.campaign import Run, RunPlan
-from tirelib.campaign.turns import expected_period, turn_samples
+from tirelib.campaign.turns import expected_period, turn_samples, turn_stack
 
 RADIUS = header().tire.free_radius
 NAN = float("nan")
@@ -52,3 +52,15 @@ def test_what_was_measured_stands_before_the_set_points() -> None:
 def test_a_wheel_that_stands_has_no_period(speed: float) -> None:
     assert expected_period(run(planned=speed), header()) is None
     assert expected_period(run(planned=speed, omega=0.0), header()) is None
+
+
+@pytest.mark.parametrize("samples", [100.0, 100.4, 99.55])
+def test_turns_of_a_stack_begin_where_turns_do_though_a_turn_is_no_number_of_samples(
+    samples: float,
+) -> None:
+    angle = 2.0 * np.pi * np.arange(6000) / samples
+    stack = turn_stack(np.stack([np.cos(angle), np.sin(angle)]), samples)
+    assert stack is not None
+    assert stack.shape[1] > 50
+    # each turn begins within half a sample of its place
+    assert np.abs(stack - stack[:, :1]).max() <= 1.01 * np.pi / samples

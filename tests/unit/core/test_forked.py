@@ -25,6 +25,27 @@ def test_results_come_in_the_order_of_the_calls(processors: int) -> None:
     np.testing.assert_array_equal(found, np.arange(COUNT)[:, None] * np.ones(3))
 
 
+def test_what_the_copy_cannot_send_is_computed_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first call waits for the second, so that each process has one of them."""
+    monkeypatch.setattr("tirelib.core.forked._processors", lambda: 2)
+    back, out = os.pipe()
+
+    def first() -> Callable[[], int]:
+        assert select.select([back], [], [], 30.0)[0], "the other waits for this call"
+        return lambda: 7
+
+    def second() -> Callable[[], int]:
+        os.write(out, b".")
+        return lambda: 8
+
+    try:
+        made = forked([first, second])
+    finally:
+        os.close(back)
+        os.close(out)
+    assert [each() for each in made] == [7, 8]
+
+
 def test_a_long_call_does_not_keep_the_others_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tirelib.core.forked._processors", lambda: 2)
     back, out = os.pipe()

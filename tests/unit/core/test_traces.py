@@ -34,3 +34,21 @@ def test_strain_and_rate_are_over_traces_gages_and_angles(
             conditions=conditions(),
             **curves,
         )
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.004, -0.004])
+def test_the_centre_gage_is_the_nearest_to_the_middle_and_angles_are_evenly_apart(
+    offset: float,
+) -> None:
+    lateral = np.array([0.06, 0.03, 0.0, -0.03, -0.06]) + offset
+    trace = StrainTrace(
+        phi=np.linspace(-0.3, 0.3, 7),
+        strain=np.zeros((3, 5, 7)),
+        rate=np.zeros((3, 5, 7)),
+        pulse=np.zeros(3),
+        lateral=lateral,
+        axis_shift=np.zeros(3),
+        conditions=conditions(),
+    )
+    assert trace.centre_gage == 2
+    assert trace.spacing == pytest.approx(0.1)

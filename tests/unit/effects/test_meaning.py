@@ -11,6 +11,7 @@ from tests.physics.test_effects import BASE, FREE_ROLLING, PLAN, TIRE, VALUES, r
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
+from tirelib.effects.belt_bending import BENDING, FOUNDATION
 from tirelib.effects.patch import held_shear
 from tirelib.effects.state import State
 from tirelib.measured.signal import LowPass
@@ -276,6 +277,31 @@ def test_braking_raises_the_second_compressive_peak_and_driving_the_first() -> N
         peaks[name] = -waves[:, GRID < 0].min(axis=1), -waves[:, GRID > 0].min(axis=1)
     assert (peaks["brake"][1] > peaks["brake"][0]).all()
     assert (peaks["drive"][1] < peaks["drive"][0]).all()
+
+
+def test_a_drive_force_turns_the_belt_with_the_lever_of_the_treads_radius() -> None:
+    points = replace(PLAN.points, drive_force=np.full(72, 1500.0))
+    state = at("traction", 1.0, points=points)
+    assert state.contact.extra is not None
+    pulled, turned = state.contact.extra[:, 0, 1:].real.T * 2.0 * np.pi * TIRE.ring_radius
+    np.testing.assert_allclose(pulled, -1500.0)
+    np.testing.assert_allclose(TIRE.ring_radius * pulled + turned, -1500.0 * TIRE.free_radius)
+
+
+def test_the_belt_bends_sideways_as_a_beam_under_the_tension_of_the_hoop() -> None:
+    """EI w'''' - p b R w'' + k w = f, harmonic by harmonic; a fibre at y takes -y w''."""
+    points = replace(PLAN.points, side_force=np.full(72, 2000.0))
+    given = {"points": points, "lateral": 0.06}
+    state = run(**given)
+    more = (at("belt_bending", 1.0, **given).strain - state.strain)[:, 1:]
+    wave_number = np.arange(1, more.shape[1] + 1) / TIRE.ring_radius
+    tension = points.pressure * TIRE.belt_width * TIRE.ring_radius
+    stiffness = BENDING * wave_number**4 + tension[:, None] * wave_number**2 + FOUNDATION
+    load = more * stiffness / (0.06 * wave_number**2)
+    # an even load, as the pressure is, has its total in the mean and less in every harmonic
+    lowest = np.abs(load[:, 0]) * np.pi * TIRE.ring_radius
+    np.testing.assert_allclose(lowest, 2000.0, rtol=0.01)
+    assert (np.abs(load) * np.pi * TIRE.ring_radius <= 2000.0 * (1.0 + 1e-9)).all()
 
 
 def test_nonuniformity_is_the_first_harmonic_with_its_phase() -> None:

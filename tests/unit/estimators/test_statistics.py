@@ -4,13 +4,20 @@ The numbers are those of statsmodels 0.15 (`OLS`) and scikit-learn 1.9 (`GroupKF
 """
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tirelib.core.units import from_si
+from tirelib.estimators.crossval import FACTOR, LEVELS, REPORT_UNIT
+from tirelib.estimators.floor import with_floor
 from tirelib.estimators.folds import held_out_folds
 from tirelib.estimators.least_squares import least_squares
 from tirelib.estimators.likeness_fit import shrunk_covariance
+from tirelib.estimators.regressors import compute_regressors
+from tirelib.estimators.train import Trained
+from tirelib.measured.observations import Observations
 
 K = np.arange(24.0)
 X = np.column_stack((np.sin(K), 120.0 + np.cos(1.7 * K), (K % 5) ** 2))
@@ -61,3 +68,24 @@ def test_many_errors_keep_their_covariance_and_few_are_drawn_together() -> None:
     np.testing.assert_allclose(shrunk_covariance(many), sample, rtol=1e-3, atol=1e-3)
     few = shrunk_covariance(np.array([[1.0, 0.0], [0.0, 2.0]]))
     np.testing.assert_allclose(few, 1.25 * np.eye(2))  # the sample's variances are 0.5 and 2
+
+
+def test_the_floor_is_how_the_turns_of_a_run_scatter_about_its_mean(
+    observed: Observations, trained: Trained
+) -> None:
+    chain, rows = trained.calibration.chains[-1], observed.usable
+    regressors = compute_regressors(observed.features, chain.gages)
+    floored = with_floor(chain, regressors, observed.unit, rows).load
+    assert floored is not None
+    loads = pd.Series(chain.predict(regressors)[0]["Fz"].value[rows])
+    runs = loads.groupby(observed.unit[rows])
+    pooled = (runs.var() * (runs.count() - 1)).sum() / (runs.count() - 1).sum()
+    assert floored.floor == pytest.approx(np.sqrt(pooled))
+
+
+def test_errors_at_held_out_levels_are_told_in_the_units_that_they_name() -> None:
+    dimension = {"N": "force", "deg": "angle", "1": "ratio", "bar": "pressure", "km/h": "speed"}
+    named = {*REPORT_UNIT.values(), *(unit for _, unit in LEVELS.values())}
+    assert named == set(FACTOR)
+    for unit, factor in FACTOR.items():
+        assert factor == pytest.approx(from_si(1.0, unit, dimension[unit]))

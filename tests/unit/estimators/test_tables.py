@@ -11,6 +11,7 @@ from tirelib.core.errors import ParameterError
 from tirelib.core.parameters import NUMBERS
 from tirelib.core.units import TABLE, to_si
 from tirelib.estimators.train import Trained
+from tirelib.measured.features.table import rate_slope
 from tirelib.measured.observations import Observations
 from tirelib.tables import SI_UNITS
 
@@ -48,6 +49,27 @@ def test_a_row_of_features_is_a_turn_and_a_gage(observed: Observations) -> None:
         observed.features.contact_angle.ravel(), nan_ok=True
     )
     assert table.attrs["units"]["contact_angle"] == "rad"
+
+
+def test_the_rows_of_a_turn_are_its_gages_in_their_order(observed: Observations) -> None:
+    features = observed.features
+    table = tirelib.feature_table(observed)
+    turns = table.groupby("turn", sort=False)
+    assert len(turns) == len(features)
+    assert (turns["time"].nunique() == 1).all()
+    assert turns["time"].first().to_numpy() == pytest.approx(features.time)
+    for column, each in (("gage", np.arange(1, 6)), ("lateral", features.lateral)):
+        assert (np.stack(list(turns[column].apply(np.array))) == each).all()
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.004, -0.007])
+def test_the_slope_across_does_not_ask_where_the_middle_of_the_tire_is(
+    observed: Observations, offset: float
+) -> None:
+    lateral = observed.features.lateral + offset
+    rate = 3.0 - 40.0 * lateral + np.zeros((len(observed), 1))
+    made = replace(observed.features, lateral=lateral, rate_lead=rate)
+    np.testing.assert_allclose(rate_slope(made), -40.0)
 
 
 def test_the_interval_of_a_number_is_that_of_its_file() -> None:

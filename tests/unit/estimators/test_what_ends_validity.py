@@ -129,3 +129,11 @@ def test_a_lateral_force_doubts_three_tenths_of_what_the_pressure_law_changes() 
     factor, doubt = LAWS.force_factor({"pressure": np.array([2e5, 2.5e5, 1.6e5])})
     np.testing.assert_allclose(factor, [1.0, 1.25**0.8, 0.8**0.8])
     np.testing.assert_allclose(doubt, 0.3 * np.abs(factor - 1.0))
+
+
+def test_a_tire_rolls_at_half_the_pressure_as_it_does_under_twice_the_load() -> None:
+    load = np.array([3e3, 3e3, 3e3, 3e3])
+    found = LAWS.equivalent_load(load, {"pressure": np.array([2e5, 1e5, 4e5, np.nan])})
+    np.testing.assert_allclose(found, [3e3, 6e3, 1.5e3, 3e3])
+    fitted = replace(LAWS, pressure_fitted=True)
+    np.testing.assert_array_equal(fitted.equivalent_load(load, {}), load)

@@ -58,6 +58,24 @@ def test_the_angle_comes_from_the_trigger(waves: Waveforms) -> None:
     assert (waves.angle_std < 2e-3).all()
 
 
+@pytest.mark.parametrize("samples", [-30, 30])
+def test_a_trigger_that_comes_later_shows_everything_at_smaller_angles(
+    samples: int, tmp_path: Path
+) -> None:
+    """The wheel turns toward larger angles: after a late zero it has come less far."""
+    run = synthetic_run(0, load=4000.0)
+    assert run.trigger is not None
+    assert run.rig is not None
+    turned = samples / run.rate * float(np.mean(run.rig["omega"]))
+    late = replace(run, trigger=np.roll(run.trigger, samples))
+    found = measure_waveforms(read_campaign(write(tmp_path / "w", [late]))).strain[0, 2]
+    errors = [
+        np.std(found - np.interp(GRID + angle, GRID, closed_form(4000.0), period=2.0 * np.pi))
+        for angle in (-turned, 0.0, turned)
+    ]
+    assert errors[2] < 0.2 * min(errors[:2])
+
+
 def test_a_turn_rate_that_no_rig_tells_is_that_of_the_contacts(tmp_path: Path) -> None:
     run = synthetic_run(0, load=4000.0)
     assert run.rig is not None
@@ -110,6 +128,16 @@ def test_scatter_of_turns_is_the_noise(waves: Waveforms) -> None:
     assert (waves.scatter > 5e-7).all()
     assert (waves.scatter < 3e-5).all()
     assert (waves.turns >= 2).all()
+
+
+def test_the_scatter_of_turns_does_not_fall_where_they_are_few(tmp_path: Path) -> None:
+    runs = [synthetic_run(i, turns=4.6 if i < 6 else 14.6, noise=4e-5) for i in range(8)]
+    found = measure_waveforms(read_campaign(write(tmp_path / "w", runs)))
+    assert found.turns[:6].max() <= 3
+    assert found.turns[6:].min() >= 11
+    # five gages with two dozen free harmonics each: a run of two turns tells it within 5 %
+    few = np.sqrt(np.mean(found.scatter[:6] ** 2))
+    assert few == pytest.approx(np.sqrt(np.mean(found.scatter[6:] ** 2)), rel=0.1)
 
 
 def test_taking_runs_takes_all_their_columns(waves: Waveforms) -> None:

@@ -1,6 +1,8 @@
 """Laws of the accuracy table, the levels and the study of the cut-off."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,8 +10,8 @@ from pages.cutoff_study import nearest_runs, study_cut_off
 
 from tests.unit.report.conftest import World
 from tirelib.measured.signal.lowpass import DEFAULT_ORDER
-from tirelib.report.accuracy import Compared, accuracies, accuracy, compare
-from tirelib.report.levels import camber_levels, find_levels, load_levels, reference_level
+from tirelib.report.accuracy import TRUTH, WIDTH, Compared, accuracies, accuracy, compare
+from tirelib.report.levels import camber_levels, find_levels, load_levels, reference_level, upright
 
 
 def made(error: np.ndarray, std: float = 1.0, turns_per_run: int = 4) -> Compared:
@@ -32,6 +34,22 @@ def test_errors_that_cancel_within_a_run_do_not_count() -> None:
 def test_the_coverage_of_honest_intervals_is_95_percent() -> None:
     error = np.random.default_rng(1).standard_normal(40000)
     assert accuracy(made(error)).coverage == pytest.approx(0.95, abs=0.004)  # 3.7 sigma of 40000
+
+
+def test_an_estimate_that_always_says_the_mean_determines_nothing() -> None:
+    truth = made(np.zeros(40)).measured
+    assert accuracy(made(truth.mean() - truth)).r2 == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("quantity", ["Fz", "alpha", "kappa", "Fy"])
+def test_an_interval_is_told_in_the_unit_of_its_quantity(world: World, quantity: str) -> None:
+    """As many turns lie within it as within the interval of the estimate in SI."""
+    observations, estimates = world.observations["set1"], world.estimates["set1"]
+    found = compare(observations, estimates, quantity)
+    truth, rows = observations.truth[TRUTH[quantity]], estimates.valid[quantity]
+    apart = np.abs(estimates.value[quantity] - truth)[rows]
+    np.testing.assert_array_equal(found.inside, apart <= WIDTH * estimates.std[quantity][rows])
+    assert 0.5 < found.inside.mean() <= 1.0
 
 
 def test_a_constant_error_is_a_share_of_the_range() -> None:
@@ -68,6 +86,16 @@ def test_levels_part_at_gaps_and_hold_every_known_value() -> None:
         "camber 0 deg",
         "camber +4 deg",
     ]
+
+
+def test_the_level_that_stands_for_all_is_one_with_many_runs() -> None:
+    loads = np.repeat([1200.0, 3000.0, 4800.0, 6600.0], [5, 1, 5, 5])
+    assert reference_level(load_levels(loads)).text == "4800 N"
+
+
+def test_a_wheel_that_leans_to_either_side_is_not_upright() -> None:
+    leaning: Any = SimpleNamespace(camber=np.array([-2.0, -0.4, 0.0, np.nan, 0.4, 2.0]))
+    assert upright(leaning).tolist() == [False, True, True, True, True, False]
 
 
 def test_runs_for_the_cut_off_are_at_one_load(world: World) -> None:

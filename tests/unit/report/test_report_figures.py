@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -170,6 +171,27 @@ def test_nothing_leaves_the_figure_and_titles_do_not_meet(
         assert box.x1 <= page.x1, figure.axes[i].get_title(loc="left")
         for other in boxes[i + 1 :]:
             assert not box.overlaps(other)
+
+
+def dots(axes: Axes) -> np.ndarray:
+    """Return the points of an axes' scatters, (n, 2)."""
+    return np.concatenate([np.asarray(part.get_offsets()) for part in axes.collections])
+
+
+def test_a_residual_is_what_was_measured_less_what_the_fit_says(drawn: dict[str, Figure]) -> None:
+    over, residuals = (dots(axes) for axes in drawn["4_4"].axes[:2])
+    assert "measured \N{MINUS SIGN} estimated" in drawn["4_4"].axes[1].get_ylabel()
+    np.testing.assert_allclose(residuals.sum(axis=1), over[:, 1], rtol=1e-9)
+
+
+def test_lateral_forces_are_drawn_up_to_the_angles_of_the_dissertations_table(
+    world: World,
+) -> None:
+    links = world.trained.links
+    angle = 2.0 * links.truth["slip_angle"]
+    wider = replace(links, truth={**links.truth, "slip_angle": angle})
+    own = dots(figures.figure_4_12(replace(world.trained, links=wider)).axes[1])
+    assert 0 < len(own) == np.count_nonzero(np.abs(np.rad2deg(angle)) <= 5.5) < angle.size
 
 
 def test_figures_do_not_need_pyplot() -> None:

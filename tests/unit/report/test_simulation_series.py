@@ -11,6 +11,7 @@ from tirelib.report.simulation_series import (
     MOST_MODES,
     Peaks,
     bending_length,
+    find_peaks,
     fine_grid,
     modes,
     nodes,
@@ -66,6 +67,23 @@ def test_peaks_with_radial_contact_stand_however_soft_the_belt(
     found = simulate(tire, load=[1500.0, 9000.0], turn_rate=60.0)
     monkeypatch.setattr(simulation, "modes", lambda *_: 1200)
     check_peaks(found.peaks, simulate(tire, load=[1500.0, 9000.0], turn_rate=60.0).peaks)
+
+
+@pytest.mark.parametrize("angle", [-0.6, 0.0, 0.6])
+def test_peaks_lie_about_the_contact_wherever_it_is(angle: float) -> None:
+    """The larger dip is before the contact, the smaller one behind it, and none is both."""
+    phi = fine_grid(121)
+    x, edges = phi - angle, angle + np.array([[-0.2, 0.2]])
+    dips = 2.0 * np.exp(-(((x + 0.35) / 0.1) ** 2)) + np.exp(-(((x - 0.35) / 0.1) ** 2))
+    strain = 4.0 * np.exp(-((x / 0.15) ** 2)) - dips
+    found = find_peaks(phi, strain[None], np.gradient(strain, phi)[None], edges)
+    still = find_peaks(phi - angle, strain[None], np.gradient(strain, phi)[None], edges - angle)
+    for name in Peaks.__slots__:
+        moved = angle if name.endswith("angle") else 0.0
+        expected = getattr(still, name) + moved
+        np.testing.assert_allclose(getattr(found, name), expected, atol=1e-9, err_msg=name)
+    assert found.cp1[0] < 1.5 * found.cp2[0] < 0.0
+    assert found.cp1_angle[0] < found.tp_angle[0] < found.cp2_angle[0]
 
 
 def test_harmonics_follow_the_bending_length() -> None:

@@ -159,19 +159,7 @@ def estimated(
     Parameters and errors as in `identify`, for runs that have been read already; `found` is called
     with the start and the fitted values.
     """
-    start = start_file(runs.waves.header, runs, tire, base)
-    values = values_of(start.tire)
-    free = coordinates(values)
-    discrepancy = Discrepancy() if base == "plain" else COARSE
-    fit = fit_waveforms(
-        runs.data(),
-        values,
-        np.array([prior_std(start, coordinate) for coordinate in free]),
-        free=free,
-        discrepancy=discrepancy,
-        progress=progress,
-        found=None if found is None else partial(found, start),
-    )
+    start, fit = fitted(runs, tire, base=base, progress=progress, found=found)
     estimates = [estimate(fit, k, start) for k in range(len(fit.free))]
     if any("not_identifiable" in e.flags for e in estimates):
         ways = next_run(fit, structure_std(start, fit.free))
@@ -180,6 +168,29 @@ def estimated(
             for k, e in enumerate(estimates)
         ]
     return start, fit, tuple(estimates)
+
+
+def fitted(
+    runs: StraightRuns,
+    tire: TireFile | None = None,
+    *,
+    base: str = "plain",
+    progress: Callable[[str], None] | None = None,
+    found: Callable[[TireFile, Mapping[str, float | FloatArray]], None] | None = None,
+) -> tuple[TireFile, WaveformFit]:
+    """Return start and priors, and the fit: `estimated` without what the fit tells of a number."""
+    start = start_file(runs.waves.header, runs, tire, base)
+    values = values_of(start.tire)
+    free = coordinates(values)
+    return start, fit_waveforms(
+        runs.data(),
+        values,
+        np.array([prior_std(start, coordinate) for coordinate in free]),
+        free=free,
+        discrepancy=Discrepancy() if base == "plain" else COARSE,
+        progress=progress,
+        found=None if found is None else partial(found, start),
+    )
 
 
 def start_file(

@@ -186,7 +186,9 @@ def judged(
         found |= {m: _likeliest(near, fit, families, m) for m in more if m not in found}
         laws = max(found, key=lambda laws: found[laws][0])
     without = _each(fit, 0.0)
-    exact, at = _likeliest(views, fit, families, without)
+    if without not in found:
+        found[without] = _likeliest(views, fit, families, without)
+    exact, at = found[without]
     sharp = [_null(at, fit, family, without) for family in families]
     loosest = _each(fit, LOOSEST)
     likeliest = sorted(alike, key=lambda laws: -found[laws][0])

@@ -114,10 +114,14 @@ class Null:
         self.blocks = [blocks[name] for name in self.names]
         self.counts = np.array([block.stop - block.start for block in self.blocks], dtype=float)
         self.usual = np.zeros(len(self.names)), np.ones(len(self.names))
+        self._shapes = np.zeros(len(view.normal.right), dtype=bool)
+        for name, block in blocks.items():
+            self._shapes[block] = "," in name or name.startswith(ROUGHLY)
         self._weighed = []
+        always = view.normal.spread(allowed)
         for size in _sizes(family.largest, shown):
             variance = {name: size.of(name) ** 2 * each for name, each in shown.items()}
-            spread = view.normal.spread(variance) + view.normal.spread(allowed)
+            spread = view.normal.spread(variance) + always
             means = {name: size.of(name) * each for name, each in family.means.items()}
             self._weighed.append((size, Weighed(view.normal.about(means), spread)))
 
@@ -171,17 +175,13 @@ class Null:
         plain, free, signs = [], [], []
         for level, weighed, left in self._at(products):
             gram, here = weighed.gram, weighed.right(left)
+            more = self._more(weighed)
             if given is not None:
-                block, more = self.blocks[given], self._more(given, weighed)
-                level = level + taken(gram, here, block, more)
+                block = self.blocks[given]
+                level = level + taken(gram, here, [block], more)[0]
                 gram, here = beside(gram, here, block, more)
             plain.append(level)
-            free.append(
-                [
-                    level + taken(gram, here, block, self._more(j, weighed))
-                    for j, block in enumerate(self.blocks)
-                ]
-            )
+            free.append(level + taken(gram, here, self.blocks, more))
             signs.append(here[first] * side[:, None] >= 0.0)
         best = np.argmax(free, axis=0)[None]
         gain = np.take_along_axis(np.array(free), best, axis=0)[0] - np.max(plain, axis=0)
@@ -203,12 +203,9 @@ class Null:
             rest = self.view.log_volume - 0.5 * (square - mean @ (right + left)) + size.log_prior
             yield weighed.gain(left) + rest, weighed, left
 
-    def _more(self, j: int, weighed: Weighed) -> FloatArray:
-        """Return the variance of a block beyond that of plain tires."""
-        block = self.blocks[j]
-        if "," in self.names[j] or self.names[j].startswith(ROUGHLY):
-            return np.asarray(MORE * weighed.root[block] ** 2)
-        return np.full(block.stop - block.start, PRIOR**2)
+    def _more(self, weighed: Weighed) -> FloatArray:
+        """Return the variance of each row beyond that of plain tires, (m,)."""
+        return np.where(self._shapes, MORE * weighed.root**2, PRIOR**2)
 
     @property
     def size(self) -> "Size":
@@ -272,9 +269,8 @@ class Null:
 
         Shapes (n,) and (n, n): coefficients of the rows of that name, beyond what plain tires show.
         """
-        weighed, j = self.likeliest, self.names.index(name)
-        block = self.blocks[j]
-        inner = weighed.gram[block, block] + np.diag(1.0 / self._more(j, weighed))
+        weighed, block = self.likeliest, self.blocks[self.names.index(name)]
+        inner = weighed.gram[block, block] + np.diag(1.0 / self._more(weighed)[block])
         covariance = np.asarray(np.linalg.inv(inner), dtype=float)
         return covariance @ weighed.right(weighed.normal.right)[block], covariance
 
@@ -285,7 +281,7 @@ class Null:
         """
         weighed, right = self.likeliest, self.likeliest.normal.right
         block, spread = self.blocks[self.names.index(name)], weighed.root**2
-        spread[block] += self._more(self.names.index(name), weighed)
+        spread[block] += self._more(weighed)[block]
         after, before = Weighed(self.view.normal, spread).mean(right), weighed.mean(right)
         before[block] = -self.likeliest.normal.mean[block]
         return after - before

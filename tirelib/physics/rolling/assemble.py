@@ -8,6 +8,7 @@ load and the wheel's torque.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -235,11 +236,13 @@ def matrix(x: Unknowns, z: FloatArray, c: Contact, k: Constants, mesh: Mesh) -> 
     n_fine = area.shape[1]
     fine = mesh.fine
     for i in range(3):
-        for j in range(3):
+        for j in range(i + 1):  # the pressure's part is symmetric
             each = c.slope * c.tip.by_down[i] * c.tip.by_down[j]
             each = each + _second(c, i, j)
             block = ((area * each) @ pairs).reshape(n, n_fine, 4, 4)
             element[:, fine, :, i, :, j] += block
+            if j < i:
+                element[:, fine, :, j, :, i] += block
         held = (area * -c.tip.by_along[i]) @ with_q
         stiff = k.k_s[:, None, None, None]
         element[:, fine, :, i, :, Q] += stiff * held.reshape(n, n_fine, 4, 4)
@@ -269,12 +272,12 @@ def _thickening(
     mesh: Mesh,
 ) -> None:
     """Add the derivatives that go through psi', by which the tread grows thicker."""
-    slope, value = mesh.road.slope, mesh.road.value
-    fine, by = mesh.fine, c.tip.by_down[3]
+    slope, fine, by = mesh.road.slope, mesh.fine, c.tip.by_down[3]
     each = area * c.slope * by
-    element[:, fine, :, 2, :, 2] += np.einsum("peg,egi,egj->peij", each * by, slope, slope)
+    by_slope, by_value = _road_products(mesh)
+    element[:, fine, :, 2, :, 2] += _summed(each * by, by_slope)
     for f in range(3):
-        cross = np.einsum("peg,egi,gj->peij", each * c.tip.by_down[f], slope, value)
+        cross = _summed(each * c.tip.by_down[f], by_value)
         element[:, fine, :, 2, :, f] += cross
         element[:, fine, :, f, :, 2] += np.swapaxes(cross, 2, 3)
     pushed = np.einsum("peg,egi->pei", each, slope)
@@ -315,12 +318,36 @@ def _belt_blocks(z: FloatArray, k: Constants, mesh: Mesh) -> FloatArray:
     """Return the belt's element matrices, (n_points, n_elements, 4, 3, 4, 3)."""
     h = belt.stiffness(z, k) * mesh.belt.weight
     n, n_elements = z.shape[1:3]
-    value = np.broadcast_to(mesh.belt.value, mesh.belt.slope.shape)
-    both = np.stack([value, mesh.belt.slope], axis=1)  # (n_elements, value or slope, n_gauss, 4)
-    products = np.einsum("eagi,ebgj->eabgij", both, both).reshape(n_elements, -1, 16)
     # (6, 6) = (value/slope, 3) x (value/slope, 3)
     split = h.reshape(2, 3, 2, 3, n, n_elements, -1)
     ordered = np.ascontiguousarray(split.transpose(5, 4, 1, 3, 0, 2, 6))
-    blocks = ordered.reshape(n_elements, n * 9, -1) @ products
+    blocks = ordered.reshape(n_elements, n * 9, -1) @ _belt_products(mesh)
     out: FloatArray = blocks.reshape(n_elements, n, 3, 3, 4, 4).transpose(1, 0, 4, 2, 5, 3)
     return out
+
+
+@cache
+def _belt_products(mesh: Mesh) -> FloatArray:
+    """Return the products of the belt's basis functions and slopes, (n_elements, 4 n_gauss, 16)."""
+    value = np.broadcast_to(mesh.belt.value, mesh.belt.slope.shape)
+    both = np.stack([value, mesh.belt.slope], axis=1)  # (n_elements, value or slope, n_gauss, 4)
+    products = np.einsum("eagi,ebgj->eabgij", both, both)
+    return np.asarray(products.reshape(mesh.n_elements, -1, 16))
+
+
+@cache
+def _road_products(mesh: Mesh) -> tuple[FloatArray, FloatArray]:
+    """Return products of the road's slopes, with slopes and with basis functions.
+
+    Both have the shape (n_fine, n_gauss, 16).
+    """
+    slope, value = mesh.road.slope, mesh.road.value
+    shape = (*slope.shape[:2], 16)
+    by_slope = np.einsum("egi,egj->egij", slope, slope).reshape(shape)
+    return by_slope, np.einsum("egi,gj->egij", slope, value).reshape(shape)
+
+
+def _summed(each: FloatArray, products: FloatArray) -> FloatArray:
+    """Return the sums over each element's points (n_points, n_fine, n_gauss), as 4 by 4 blocks."""
+    out = each[:, :, None] @ products
+    return out.reshape(*each.shape[:2], 4, 4)

@@ -39,6 +39,8 @@ class Mesh:
         Nodes of all elements but the last's end, which is the first's start.
     belt, road : Points
         Integration points of all elements, and of the fine ones.
+    at_nodes : shape (n_fine, 4, 4), [1/rad]
+        Slopes of the basis at the fine elements' nodes.
     """
 
     ends: FloatArray
@@ -46,6 +48,7 @@ class Mesh:
     node: FloatArray
     belt: "Points"
     road: "Points"
+    at_nodes: FloatArray
 
     @property
     def n_elements(self) -> int:
@@ -58,12 +61,6 @@ class Mesh:
         start, end = self.ends[:-1][self.fine], self.ends[1:][self.fine]
         out: FloatArray = start[:, None] + (end - start)[:, None] * np.arange(4) / ORDER
         return out
-
-    @property
-    def at_nodes(self) -> FloatArray:
-        """Slopes of the basis at the fine elements' nodes, (n_fine, 4, 4), [1/rad]."""
-        size = np.diff(self.ends)[self.fine]
-        return np.asarray(_lagrange(np.arange(4.0) / ORDER)[1] / size[:, None, None])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,6 +106,7 @@ def mesh(fine: int = FINE, coarse: int = COARSE) -> Mesh:
         node,
         _points(ends, slice(0, ends.size - 1), N_BELT),
         _points(ends, patch, N_ROAD),
+        _lagrange(np.arange(4.0) / ORDER)[1] / np.diff(ends)[patch, None, None],
     )
 
 

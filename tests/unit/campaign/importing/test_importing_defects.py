@@ -13,6 +13,8 @@ from tests.unit.campaign.importing.importing_synthetic import (
     write_csv,
 )
 from tirelib.campaign import Run, read_campaign
+from tirelib.campaign.importing.columns import Column, Table
+from tirelib.campaign.importing.defects import Clock, Defects, mended
 
 
 def repeated(columns: Columns) -> None:
@@ -126,6 +128,31 @@ def test_times_that_start_anew_in_each_run_are_no_defect(
     by = sae_map(run_column="RUN", repeated_time="drop", backward_time="drop")
     report = imported(write_csv(tmp_path / "rig.csv", columns), by=by)
     assert [run.rows for run in report.runs] == [200, 199]
+
+
+def test_segments_of_a_run_are_joined_and_another_run_keeps_its_own_times() -> None:
+    """A clock that starts again five times, the third time with another run."""
+    run = np.repeat([1.0, 2.0], [12, 8])
+    table = Table(
+        "a.csv",
+        "text table",
+        {"t": Column("t", np.tile(0.5 * np.arange(4.0), 5)), "run": Column("run", run)},
+    )
+    found, notes = mended(table, Defects(backward_time="join"), [Clock("t", ("run",))], "run")
+    times = found.columns["t"].values
+    np.testing.assert_allclose(times[:12], 0.5 * np.arange(12.0))
+    np.testing.assert_allclose(times[12:], 0.5 * np.arange(8.0))
+    assert "3 segments were joined" in notes[0]
+
+
+def test_what_is_missing_is_interpolated_in_time_and_not_from_row_to_row() -> None:
+    time = np.cumsum([0.0, 1.0, 1.0, 5.0, 0.5, 0.5, 3.0])
+    load = 1e3 + 20.0 * time
+    holed = load.copy()
+    holed[[2, 4, 5]] = np.nan
+    table = Table("a.csv", "text table", {"t": Column("t", time), "Fz": Column("Fz", holed)})
+    found, _ = mended(table, Defects(missing="interpolate"), [Clock("t", ("Fz",))], "")
+    np.testing.assert_allclose(found.columns["Fz"].values, load)
 
 
 def test_an_unknown_choice_is_refused_with_those_that_are_known(

@@ -277,6 +277,7 @@ def test_a_run_column_divides_one_file(imported: Importer, tmp_path: Path) -> No
         set_points={
             "pressure_bar": {"column": "PSET", "unit": "kPa"},
             "load_N": {"mean_to": 100},
+            "slip_angle_deg": {"mean_to": 0.5},
             "speed_kmh": 40.0,
         },
         runs={"3": {"note": "wet", "speed_kmh": 41.0}, "12": {"skip": True}},
@@ -286,6 +287,11 @@ def test_a_run_column_divides_one_file(imported: Importer, tmp_path: Path) -> No
     assert [plan.run for plan in campaign.plans] == [7, 3]
     seven, three = campaign.plans
     assert (seven.pressure, seven.load) == pytest.approx((0.8e5, 1500.0))
+    # a mean is rounded in the file's axes, and a set point stands in those of ISO
+    for plan, span in ((seven, slice(0, 100)), (three, slice(100, 200))):
+        mean = 0.5 * np.round(columns["SA"][span].mean() / 0.5)
+        assert plan.slip_angle == pytest.approx(-mean * DEG)
+    assert abs(seven.slip_angle) > 2.0 * DEG
     assert (seven.speed * 3.6, three.speed * 3.6) == pytest.approx((40.0, 41.0))
     assert three.extra == {"note": "wet"}
     assert (seven.start, three.start) == pytest.approx((10.0, 11.0))
@@ -318,7 +324,7 @@ def test_uneven_gage_times_become_the_even_clock_and_that_is_said(
 ) -> None:
     run = synthetic.synthetic_run(0, turns=3.2)
     assert run.strain is not None
-    times = run.time()
+    times = 7.5 + run.time()  # the logger had run before
     jitter = np.zeros(times.size)
     jitter[5:-5:7] = 1e-5  # a tenth of a step
     columns = {"t": times + jitter} | {f"G{k}": row for k, row in enumerate(run.strain, start=1)}

@@ -136,6 +136,27 @@ PDY1=0.9
     assert tire.number("WIDTH") is None
 
 
+DEG = 0.017453292519943295
+
+
+@pytest.mark.parametrize(
+    ("key", "given", "si"),
+    [
+        ("GRAVITY", 9.81e-3, 9.81),  # mm/ms^2
+        ("YAW_STIFFNESS", 4.0, 4.0 / DEG),  # kN mm/deg
+        ("VERTICAL_DAMPING", 5e-4, 0.5),  # kN ms/mm
+        ("BELT_IYY", 7e8, 0.7),  # g mm^2
+        ("CAMMAX", 5.0, 5.0 * DEG),
+    ],
+)
+def test_a_number_follows_the_units_that_its_own_is_made_of(
+    key: str, given: float, si: float
+) -> None:
+    units = "LENGTH='mm'\nFORCE='kN'\nANGLE='degrees'\nMASS='gram'\nTIME='ms'\n"
+    tire = parse_tir(f"[UNITS]\n{units}[MODEL]\nFITTYP=61\n[X]\n{key}={given!r}\n")
+    assert tire.number(key) == pytest.approx(si, rel=1e-9)
+
+
 def test_pressure_without_unit_is_force_per_length_squared() -> None:
     text = TEXT.replace("'meter'", "'mm'") + "[OPERATING_CONDITIONS]\nNOMPRES=0.25\n"
     assert parse_tir(text).number("NOMPRES") == pytest.approx(250000.0)

@@ -8,6 +8,7 @@ import pytest
 from tests.unit.inference.compare.compare_synthetic import bump, model_file, waveforms
 from tirelib.inference.compare.document import comparison_document
 from tirelib.inference.compare.model import model_of
+from tirelib.inference.compare.sectors import weighted_variance
 from tirelib.inference.compare.strain import Comparison, compare_strain
 from tirelib.measured.waveforms import GRID, Waveforms
 from tirelib.report.comparison import strain_parts
@@ -42,6 +43,12 @@ def test_the_gage_that_differs_is_told_by_its_place_and_no_other(found: Comparis
     # set points of the mean take some per cent of a plateau
     assert departure.mean == pytest.approx(-PLANT, rel=0.12)
     assert departure.of_all == pytest.approx(-PLANT / 5, rel=0.35)
+    # the mean over a region's runs is surer than one run by the root of their number
+    inside = (departure.region.start <= GRID) & (departure.region.stop > GRID)
+    weights = np.tile(inside / inside.sum(), (len(found.run), 1))
+    each = weighted_variance(weights, found.gages[3].noise, found.points)
+    one = np.sqrt(each[departure.region.member].mean())
+    assert departure.std == pytest.approx(one / np.sqrt(departure.region.runs))
     said = [text for text in found.sentences if text.startswith("At the gage")]
     assert len(said) == 1
     assert said[0].startswith("At the gage at y = -30 mm, in the contact, from -0.10 to 0.10 rad")

@@ -1,6 +1,7 @@
 """Laws of the parts: set points, noise, contact length, floor, forces' words."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from tests.synthetic import waveform
 from tests.unit.inference.compare.compare_synthetic import bump, model_file, waveforms
 from tirelib.campaign import Tolerance
 from tirelib.inference.compare.model import model_of
+from tirelib.inference.compare.regions import bin_edges, find_regions
 from tirelib.inference.compare.set_points import predict_set_points
 from tirelib.inference.compare.strain import compare_strain
 from tirelib.inference.compare.tracks import contact_angle, pooled
@@ -65,6 +67,24 @@ def test_the_variance_of_one_sample_is_that_of_the_noise_and_means_are_surer() -
     assert variance[0] == pytest.approx(9e-12, rel=1e-9)
     assert variance[1] < 0.7 * variance[0]
     assert variance[2] == pytest.approx(0.0, abs=1e-25)
+
+
+def test_the_mean_of_a_region_is_twice_as_sure_with_four_times_the_runs() -> None:
+    power = np.full(GRID.size // 2 + 1, 9e-12 / GRID.size)
+    noise = RepeatNoise(3e-6, 5, power, 200.0, 50.0)
+    inside = (bin_edges()[20] <= GRID) & (bin_edges()[24] > GRID)
+    deviation = []
+    for n in (4, 16):
+        still: Any = SimpleNamespace(
+            tangent=np.zeros((n, GRID.size, 5)), covariance=np.zeros((n, 5, 5))
+        )
+        rest = np.tile(1e-4 * inside, (n, 1))
+        (found,) = find_regions(rest, rest, np.ones(n, dtype=bool), (), noise, still)
+        assert (found.start, found.stop) == (bin_edges()[20], bin_edges()[24])
+        own = noise.variance(inside[None] / inside.sum())[0]
+        assert found.std == pytest.approx(np.sqrt(own / n))
+        deviation.append(found.std)
+    assert deviation[0] == pytest.approx(2.0 * deviation[1])
 
 
 def test_stated_deviations_hold_on_new_noise() -> None:

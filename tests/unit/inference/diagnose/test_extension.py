@@ -31,6 +31,15 @@ def test_adding_the_planted_effect_takes_the_error_away() -> None:
     assert done.flags == ()
 
 
+def test_an_effect_of_another_quantity_stays_in_the_file() -> None:
+    """What was fitted to strain replaces what acts on strain, and leaves the brush alone."""
+    file, done = model_file(("friction_load", 0.1), (EFFECT, 0.9)), added()[0]
+    effects = extended_file(file, done, "hash").extra["effects"]
+    assert [each["effect"] for each in effects] == ["friction_load", EFFECT]
+    assert effects[0] == file.extra["effects"][0]
+    assert effects[1]["strength"] == pytest.approx(STRENGTH, abs=0.02)
+
+
 def test_the_error_falls_on_runs_that_were_left_out() -> None:
     done, _ = added()
     assert [fold.name for fold in done.folds] == ["load", "pressure"]

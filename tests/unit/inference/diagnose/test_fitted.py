@@ -94,11 +94,12 @@ def test_its_error_is_that_of_the_model_file(lacking: Fitted) -> None:
 @pytest.mark.parametrize("k", range(len(BARE)), ids=[each.name for each in BARE])
 def test_no_coordinate_goes_much_lower(plain: Fitted, k: int) -> None:
     """The likeliest numbers beside what plain tires show give little of the error away."""
-    measured, step = runs(), 0.02 * float(WIDTH[BARE[k].name])
+    yardstick, step = Yardstick.of(runs()), 0.02 * float(WIDTH[BARE[k].name])
     for side in (-step, step):
         z = np.zeros(len(BARE))
         z[k] = side
-        there = error_of(measured, replace(plain.model, values=move(plain.values, z, BARE)))
+        moved = replace(plain.model, values=move(plain.values, z, BARE))
+        there = yardstick.error(moved, start=plain.rolling)
         assert there.value > 0.96 * plain.error, f"{BARE[k].name} moved by {side:g}"
 
 
@@ -111,7 +112,7 @@ def test_no_other_numbers_have_less_than_the_least_error(lacking: Fitted) -> Non
 
     def left(z: FloatArray) -> FloatArray:
         model = replace(lacking.model, values=move(lacking.values, z, BARE))
-        return np.asarray(error_of(measured, model).by_run)
+        return np.asarray(yardstick.error(model, start=lacking.rolling).by_run)
 
     found = optimize.least_squares(left, np.zeros(len(BARE)), diff_step=1e-3, max_nfev=12)
     assert least.value < 1.05 * np.sqrt(np.mean(found.fun**2))

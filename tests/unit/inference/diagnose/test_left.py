@@ -16,7 +16,7 @@ from tirelib.inference.compare.model import TireModel, model_of
 from tirelib.inference.diagnose.diagnose import plain_tires
 from tirelib.inference.diagnose.document import next_test
 from tirelib.inference.diagnose.held_out import pooled, strain_folds
-from tirelib.inference.diagnose.left import left_of, told_range
+from tirelib.inference.diagnose.left import left_of, powers_of, told_range
 from tirelib.inference.diagnose.strain_models import Fitted, floor_of
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.problems.strain import StrainProblem
@@ -178,3 +178,18 @@ def test_every_verdict_has_a_next_step(verdict: str, names: tuple[str, ...], say
 def test_a_range_through_the_seam_of_the_turn_is_told_in_the_angles_of_the_plots() -> None:
     assert told_range(*np.deg2rad([-6.0, 7.0])) == "from -6 to 7 deg"
     assert told_range(*np.deg2rad([154.0, 296.0])) == "from 154 through 180 to -64 deg"
+
+
+def test_intervals_of_powers_hold_95_percent_of_them() -> None:
+    """Of sizes that scatter by a fifth about a law of load and speed, in few runs."""
+    random = np.random.default_rng(8)
+    load, speed = (grid.ravel() for grid in np.meshgrid([2e3, 4e3, 6e3], [10.0, 20.0, 30.0]))
+    inside = []
+    for _ in range(600):
+        size = load**0.5 / speed * np.exp(0.2 * random.standard_normal(load.size))
+        found = powers_of({"load": load, "speed": speed}, size)
+        inside += [
+            p.low < true < p.high for p, true in zip(found.values(), (0.5, -1.0), strict=True)
+        ]
+    # 1200 intervals: 0.6 % of a share of 95 %
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.02)

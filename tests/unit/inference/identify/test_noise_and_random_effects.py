@@ -228,3 +228,18 @@ def test_white_noise_has_as_many_independent_samples_as_orders() -> None:
     white = np.random.default_rng(0).standard_normal((400, N_PHI))
     assert independent(white) == pytest.approx(N_PHI, rel=0.05)
     assert independent(np.zeros((2, N_PHI))) == N_PHI
+
+
+@pytest.mark.parametrize("size", [15, 16])
+def test_white_noise_is_as_large_in_the_highest_harmonic_as_in_any_other(size: int) -> None:
+    """An even number of samples has one wave that changes its sign from each to the next."""
+    groups = 400
+    drawn = NOISE * np.random.default_rng(0).standard_normal((2 * groups, size))
+    drawn -= drawn.mean(axis=1, keepdims=True)
+    nothing = np.zeros((2 * groups, size, 4))
+    found = repeat_noise(drawn, np.repeat(np.arange(groups), 2), nothing)
+    order = np.arange(1, size // 2 + 1)
+    waves = np.cos(2.0 * np.pi * order[:, None] * np.arange(size) / size)
+    waves /= np.linalg.norm(waves, axis=1, keepdims=True)
+    # five harmonics of 400 pairs are taken together: their mean power is known to 3 %
+    np.testing.assert_allclose(found.variance(waves) / found.std**2, 1.0, atol=0.15)

@@ -1,6 +1,7 @@
 """The fit finds what the model itself made, and its intervals are those of its cost."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -43,6 +44,7 @@ WIDE = np.array([1.0, 1.0, 3.0, 1.0, 3.0, 1.0, 1.0, 1.0])
 """So wide that it tells next to nothing."""
 
 
+@cache
 def data(seed: int = 0, **options: object) -> Data:
     waves = made_waves(noise=NOISE, seed=seed, **options)
     # noise of the mean over five gages; no structure in what the model made

@@ -7,6 +7,7 @@ from tests.unit.inference.identify.model_waves import TIRE
 from tirelib.core.errors import ParameterError
 from tirelib.effects import CATALOGUE
 from tirelib.inference.planning.selftest import Planting, SelfTest, selftest, selftest_document
+from tirelib.inference.statistics.chance import Judged, Plans
 from tirelib.model.base import values_of
 
 REPEATS = 6
@@ -43,6 +44,24 @@ def test_the_strength_grows_with_the_ratio(tested: SelfTest) -> None:
     assert strong.strength == pytest.approx(share * faint.strength)
     assert strong.seen >= faint.seen
     assert len(strong.named) == REPEATS
+
+
+def test_what_is_planted_is_the_strength_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In ranges of the effect: at its plausible end it has its largest ratio."""
+    planted, done = Plans.planted, []
+
+    def noted(plans: Plans, name: str, strength: float) -> Judged:
+        done.append(CATALOGUE[name].scale * strength)
+        return planted(plans, name, strength)
+
+    monkeypatch.setattr(Plans, "planted", noted)
+    found = self_tested(3)
+    told = [each for each in found.plantings if each.reachable]
+    assert done == pytest.approx([each.strength for each in told])
+    for each in told:
+        share = (each.strength / each.effect.toward) ** 2
+        most = found.largest[each.effect.name]
+        assert share == pytest.approx((each.ratio**2 - 1.0) / (most**2 - 1.0))
 
 
 def test_what_no_plausible_strength_reaches_is_not_planted(tested: SelfTest) -> None:

@@ -66,6 +66,17 @@ def in_runs(slips: list[int], camber: float = 0.0) -> ForcePoints:
     )
 
 
+def test_a_slip_that_is_visited_twice_has_the_rate_of_each_visit() -> None:
+    made, angles = in_runs([12] * 4), np.deg2rad([-6.0, -3.0, -1.0, 1.0, 3.0, 6.0])
+    visited = replace(made.data, slip_angle=np.tile(np.repeat(angles, 2), 4))
+    found = campaign_sweep(
+        replace(made, data=visited, slip_rate=np.full(len(made), 0.05)), "slip_angle"
+    )
+    assert found is not None
+    assert found.values == pytest.approx(angles)
+    assert found.rates == pytest.approx(0.05)
+
+
 @pytest.mark.parametrize(
     ("slips", "camber", "several"),
     [

@@ -11,6 +11,7 @@ from tests.unit.inference.force_points import force_problem
 from tirelib.core.arrays import FloatArray
 from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE, effect
+from tirelib.inference.problems.whiten_forces import PointWhitener
 from tirelib.inference.statistics.plain import Family
 from tirelib.inference.statistics.posterior import posterior
 from tirelib.inference.statistics.problem import Point
@@ -71,6 +72,22 @@ def test_whitened_rows_have_the_covariance_of_noise_and_of_set_points_off_in_a_b
     block = made.bench.points.data.block
     assert np.all(covariance[block[:, None] != block] == 0.0)
     assert np.all(np.diag(covariance) > made.noise**2)
+    assert whiten.log_volume == pytest.approx(-0.5 * np.linalg.slogdet(covariance)[1])
+
+
+@pytest.mark.parametrize("size", [0.0, 1.0])
+def test_whitening_undoes_noise_set_points_and_a_misfit_that_near_points_share(size: float) -> None:
+    """Points at one place have the same misfit; those of another block have nothing of it."""
+    random = np.random.default_rng(0)
+    noise, rows = random.uniform(2.0, 30.0, 12), random.standard_normal((3, 12))
+    tangent, amount = 20.0 * size * random.standard_normal((12, 2)), size * np.full(12, 15.0)
+    block = np.repeat([1, 0, 1], 4)
+    whiten = PointWhitener.of(block, tangent, np.zeros(12), amount, noise=noise)
+    shared = tangent @ tangent.T + np.outer(amount, amount)
+    covariance = np.diag(noise**2) + shared * (block[:, None] == block)
+    drawn = whiten.coloured(np.eye(12))
+    np.testing.assert_allclose(drawn.T @ drawn, covariance, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(whiten(whiten.coloured(rows)), rows, atol=1e-9)
     assert whiten.log_volume == pytest.approx(-0.5 * np.linalg.slogdet(covariance)[1])
 
 

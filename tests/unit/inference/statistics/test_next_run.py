@@ -9,7 +9,7 @@ import pytest
 from tests.unit.inference.statistics.linear_problem import N, Solved, Toy, by_effect, drawn, family
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.inference.statistics.hypotheses import Hypotheses
-from tirelib.inference.statistics.next_run import next_runs
+from tirelib.inference.statistics.next_run import _with, next_runs
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 MORE = 60
@@ -120,3 +120,28 @@ def test_an_effect_that_is_there_puts_no_effect_out_and_not_the_other_way_round(
     (other,) = next_runs(ahead, (hypotheses.base, bend), 0.05)
     assert other.chance == pytest.approx(pair.chance)
     assert other.gap == pytest.approx(-pair.gap)
+
+
+def test_runs_that_show_the_same_are_worth_the_same(rivals: tuple[Ahead, Hypotheses]) -> None:
+    """The draws are the same at every run: runs differ by what they show and not by chance."""
+    ahead, hypotheses = rivals
+    twins = copy(ahead)
+    twins.by = {name: rows.copy() for name, rows in ahead.by.items()}
+    twist = 0.2 * ahead.by["twist"][:, N + MORE :]  # weak enough not to be certain
+    for name, rows in twins.by.items():
+        rows[:, N:] = np.tile(twist if name == "twist" else 0.0 * twist, 2)
+    bend, twist_too = (hypotheses.at([name]) for name in ("bend", "twist"))
+    assert bend is not None
+    assert twist_too is not None
+    (pair,) = next_runs(twins, (bend, twist_too), 0.05)
+    assert pair.std[0] > 0.0
+    for both in (pair.chance, pair.separation, pair.std):
+        # the toy's rough laws are waves over all samples, which differ in the two runs
+        assert both[0] == pytest.approx(both[1], rel=1e-4)
+
+
+def test_a_run_that_is_done_again_counts_twice(rivals: tuple[Ahead, Hypotheses]) -> None:
+    base = rivals[1].base.null
+    twice = _with(base, base.view.white).view.normal
+    np.testing.assert_allclose(twice.gram, 2.0 * base.view.normal.gram)
+    assert twice.count == 2 * base.view.normal.count

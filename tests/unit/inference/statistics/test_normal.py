@@ -31,7 +31,9 @@ def test_what_a_block_takes_is_its_density_beside_the_volume_of_its_prior(
     before, more = {"base": 9.0, "one": 0.01}, 0.25
     weighed = Weighed(normal, normal.spread(before))
     block = normal.blocks["one"]
-    found = taken(weighed.gram, weighed.right(normal.right)[:, None], block, np.full(size, more))[0]
+    found = taken(
+        weighed.gram, weighed.right(normal.right)[:, None], [block], np.full(4 + size, more)
+    )[0, 0]
     volume = np.linalg.slogdet(np.eye(size) + more * weighed.gram[block, block])[1]
     densities = [
         stats.multivariate_normal(cov=dense(rows, {**before, "one": one})).logpdf(rest)

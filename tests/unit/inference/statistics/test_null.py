@@ -164,3 +164,46 @@ def test_what_a_tire_shows_at_least_does_not_depend_on_the_unit_of_a_strength() 
     assert at_least["b"] == 4e-4
     assert 2.0 * at_least["a"] == pytest.approx(least)
     assert 3.0 * at_least["own"] == pytest.approx(least)
+
+
+def test_a_test_about_other_rows_holds_scores_against_the_same_plain_tires() -> None:
+    found = plain((FAMILIES[0], LOUD)).null
+    assert found.usual[1].max() > 1.2
+    assert found.about(found.view).scores == pytest.approx(found.scores)
+
+
+def shown_always(bend: float) -> null.Null:
+    """Return a toy tire in a family that always bends by 1.5 ranges and shows little else."""
+    squares = 1e-8 * np.ones_like(FAMILIES[0].squares)
+    bent = replace(FAMILIES[0], squares=squares, means={"bend": 1.5})
+    toy = Toy(drawn(np.random.default_rng(2), size=0.0, bend=bend))
+    fit = posterior(toy, (), bent.shown(), toy.whitener(0.001))
+    return null.Null(fit.views(toy, [0.001])[0], bent, bent.shown(), {}, {})
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
+def test_a_tire_that_shows_a_multiple_of_its_familys_mean_has_that_size(factor: float) -> None:
+    """And what explains it is that multiple, though the family hardly varies."""
+    found = shown_always(1.5 * factor)
+    assert found.size.whole == factor
+    place = found.view.normal.blocks["bend"].start
+    assert found.explained()[place] == pytest.approx(1.5 * factor, abs=1e-3)
+
+
+def test_an_effect_that_is_there_moves_from_zero_and_not_from_what_its_family_shows() -> None:
+    found = shown_always(2.0)
+    assert found.size.whole == 1.0
+    place = found.view.normal.blocks["bend"].start
+    # 300 samples of unit noise against rows of unit size, five standard errors
+    assert found.moved("bend")[place] == pytest.approx(2.0, abs=5.0 / np.sqrt(N))
+
+
+@pytest.mark.parametrize("ratio", [0.25, 0.5, 1.0, 2.0])
+def test_a_size_is_as_likely_as_its_inverse_and_both_parts_count_alike(ratio: float) -> None:
+    whole, free = 1.7, 1.7 * ratio
+    prior = null.Size(whole, free).log_prior
+    assert prior == pytest.approx(null.Size(1.0 / whole, 1.0 / free).log_prior)
+    assert prior == pytest.approx(null.Size(free, whole).log_prior)
+    one = float(np.exp(null.SIZE_STD))
+    assert null.Size(one, one).log_prior == pytest.approx(-0.5)
+    assert null.Size(1.0, 1.0).log_prior == 0.0

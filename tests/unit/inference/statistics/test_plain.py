@@ -9,7 +9,7 @@ from tests.unit.inference.statistics.linear_problem import PLAIN, Toy, drawn, fa
 from tirelib.inference.statistics import null
 from tirelib.inference.statistics.hypothesis import judged
 from tirelib.inference.statistics.null import Null
-from tirelib.inference.statistics.plain import View, learn, load, save
+from tirelib.inference.statistics.plain import View, learn, load, pooled, save
 from tirelib.inference.statistics.posterior import posterior
 
 COMMON = 0.4
@@ -69,3 +69,26 @@ def test_the_side_that_a_family_never_shows_stands_out() -> None:
 
     assert score(COMMON) < 2.0
     assert score(-COMMON) > score(COMMON) + 5.0
+
+
+def test_a_tire_that_does_not_know_a_block_takes_no_part_in_what_is_shown() -> None:
+    whole = family(40)
+    squares = whole.squares.copy()
+    squares[10:, 1] = np.nan
+    found = replace(whole, squares=squares).shown()
+    assert found["bend"] == pytest.approx(whole.squares[:10, 1].mean())
+    assert found["twist"] == pytest.approx(whole.shown()["twist"])
+
+
+def test_families_together_spread_by_what_they_show_to_either_side() -> None:
+    """Their second moment about nothing: the variance of a family and the square of its mean."""
+    sizes = dict.fromkeys(PLAIN, 1.0)
+
+    def together(*means: float) -> float:
+        shown = [replace(family(40), means={"swell": mean}) for mean in means]
+        return pooled(shown, sizes)["swell"]
+
+    variance = family(40).spread(sizes)["swell"]
+    assert together(0.0) == pytest.approx(variance)
+    assert together(COMMON) == together(-COMMON) == pytest.approx(variance + COMMON**2)
+    assert together(COMMON, -COMMON, 0.0) == pytest.approx(variance + 2.0 / 3.0 * COMMON**2)

@@ -18,6 +18,7 @@ from tests.unit.inference.statistics.linear_problem import (
 )
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
+from tirelib.effects import effect
 from tirelib.inference.statistics.bounded import bounded_step
 from tirelib.inference.statistics.plain import BASE
 from tirelib.inference.statistics.posterior import SETTLED, posterior
@@ -47,6 +48,31 @@ def test_what_a_tire_shows_stays_within_its_range() -> None:
     assert fit.strength("twist") == pytest.approx([0.0], abs=1e-9)
     fit = posterior(Toy(0.4 * toy.by["twist"][0]), [], wide, Louder(0.001))
     assert fit.strength("twist") == pytest.approx([0.8], abs=0.05)
+
+
+@pytest.mark.parametrize("width", [10.0, 0.02])
+def test_a_deviation_is_what_least_squares_leaves_beside_everything_else(width: float) -> None:
+    """Each number by itself, of an effect with two and of the one behind it, in its own unit."""
+
+    @effect("pair", stage="gage", unit="1", low=-0.5, high=0.5, components=2, source="toy")
+    def pair(state: Any, strength: Any) -> Any:
+        """Return the state as it is."""
+        return state
+
+    toy = Toy(drawn(np.random.default_rng(1)))
+    random = np.random.default_rng(4)
+    # the second of the two is shown half as much, and much like a direction of the base
+    toy.by["pair"] = np.stack([random.standard_normal(N), 0.1 * random.standard_normal(N)])
+    toy.by["pair"][1] += 0.4 * toy.base[0]
+    toy.widths = np.full(3, width)
+    fit = posterior(toy, [pair, EFFECTS["bend"]], {}, Louder(LEAST_OWN))
+    rows = np.concatenate([toy.base, toy.by["pair"], toy.by["bend"]])
+    know = np.concatenate([toy.widths, np.ones(3)])
+    deviation = np.sqrt(np.diag(np.linalg.inv(rows @ rows.T + np.diag(know**-2.0))))
+    # other effects are held to a variance of 1e-11, and not to none
+    assert fit.std(0) == pytest.approx(0.5 * deviation[3:5], rel=1e-5)
+    assert fit.std(1) == pytest.approx(2.0 * deviation[5:], rel=1e-5)
+    assert (np.sqrt(np.diag(fit.covariance)[:3]) <= width).all()
 
 
 class Ending(Toy):

@@ -12,7 +12,7 @@ from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.inference.statistics.hypothesis import LAWS, Hypothesis
 from tirelib.inference.statistics.posterior import Posterior
 from tirelib.inference.statistics.problem import Point
-from tirelib.inference.statistics.rival import p_against
+from tirelib.inference.statistics.rival import _likelihood, p_against
 from tirelib.inference.statistics.select import select
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
@@ -83,6 +83,12 @@ def test_a_rival_that_gains_nothing_puts_nothing_out() -> None:
     assert one is not None
     assert other is not None
     assert p_against(toy, one, other) > 0.2
+    # a family's tires are judged by the others and never by their own
+    still = np.zeros((1, N))
+    for own in one.nulls:
+        others = replace(one, nulls=[each for each in one.nulls if each is not own])
+        judged = [_likelihood(toy, each, own.family, still) for each in (one, others)]
+        assert judged[0] == judged[1]
 
 
 def test_a_rival_counts_even_where_it_is_itself_rejected(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,7 @@
 """Closed forms (3), (4), (5), (8), (26), and friction from forces with its honest range."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,6 +9,7 @@ from hypothesis import strategies as st
 
 from tirelib.core.errors import ParameterError
 from tirelib.physics.brush.friction import (
+    FrictionEstimate,
     friction_from_moment,
     friction_from_stiffness,
     friction_from_two_angles,
@@ -130,6 +133,32 @@ def test_standard_deviation_is_the_scatter_of_repeats(way: str, share: float) ->
     assert found.determined.mean() > 0.99
     scatter = np.nanstd(found.friction)
     assert float(np.median(found.std)) == pytest.approx(scatter, rel=0.12)
+
+
+SOFT = 8000.0
+"""Cornering stiffness with which the contact slides at half a radian only, [N/rad]."""
+
+
+@pytest.mark.parametrize("tell", [friction_from_moment, friction_from_stiffness])
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_each_input_alone_gives_its_slope_times_its_deviation(
+    tell: Callable[..., FrictionEstimate], share: float
+) -> None:
+    c = SOFT / (2 * A**2)
+    alpha = np.arctan(share * np.tan(sliding_angle(c, 0.9, LOAD, A)))
+    assert alpha > 0.3  # tan and its argument differ
+    given = {"Fy": lateral_force(alpha, c, 0.9, LOAD, A), "load": LOAD}
+    if tell is friction_from_moment:
+        given |= {"Mz": aligning_moment(alpha, c, 0.9, LOAD, A), "half_length": A}
+    else:
+        given |= {"slip_angle": alpha, "cornering_stiffness": SOFT}
+    none = {f"{name}_std": 0.0 for name in given}
+    for name, value in given.items():
+        step = 1e-6 * np.abs(value)
+        ends = [tell(**{**given, name: value + k * step}, **none).friction for k in (-1.0, 1.0)]
+        std = tell(**given, **{**none, f"{name}_std": step}).std
+        # a central difference: of the second order in a step of 1e-6
+        np.testing.assert_allclose(std, np.abs(ends[1] - ends[0]) / 2.0, rtol=1e-5)
 
 
 def test_tiny_slip_tells_nothing() -> None:
