@@ -280,8 +280,8 @@ _ALL = (
     Effect(
         "gain_pressure",
         "gain 1 + s ln(p / 2 bar)",
-        0.05,
-        0.5,
+        0.1,
+        0.25,
         "1",
         shown=lambda t, _, r, s: _scaled(t, 1.0 + s * float(np.log(r.cond.pressure / 2e5))),
     ),

@@ -268,7 +268,7 @@ _EFFECTS = (
         "gain_pressure",
         "gain goes with the square root of the pressure",
         0.1,
-        0.8,
+        0.25,
         "1",
         signed=True,
         on_trace=shown.pressure_sensitive,

@@ -304,7 +304,8 @@ def _help(estimate: Estimate, fit: WaveformFit, k: int, ways: NextRun) -> str:
     def percent(half: float) -> float:
         # of a number that is zero: in percent of its prior's unit
         size = abs(estimate.value) or coordinate.unit
-        return 100.0 * coordinate.spread(estimate.value, half) / size
+        low, high = (float(coordinate.moved(estimate.value, step)) for step in (-half, half))
+        return 50.0 * abs(high - low) / size
 
     now = percent(float(ways.half_width[k]))
     best = ways.best(k)
