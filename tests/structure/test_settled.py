@@ -21,6 +21,8 @@ def test_identification_settles_where_slopes_hold_on_one_side_only() -> None:
     runs = straight_runs(load_case(FILE).waves)
     start, fit = fitted(runs)
     estimates = [estimate(fit, k, start) for k in range(len(fit.free))]
-    assert fit.steps < 45
+    # with one damping for all numbers it ended after 37 steps, 40 units of the cost higher
+    assert fit.steps < 100
+    assert fit.found.cost < 1200.0
     assert np.isfinite([e.value for e in estimates]).all()
     assert fit.error < 1.0  # below its noise and the misfit that it allows

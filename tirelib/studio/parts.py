@@ -18,7 +18,10 @@ PARTS = {
         *("trailing_sliding", "hydroplaning", "roughness", "camber", "load_transfer", "traction"),
         *("ring_pressure", "brush_camber", "relaxation", "combined_slip"),
     ),
-    "gages": ("gage_length", "low_pass", "gage_gain", "gage_saturation", "gage_offset"),
+    "gages": (
+        *("gage_length", "low_pass", "gage_gain", "gage_saturation", "gage_offset"),
+        *("gain_load", "gain_pressure", "gain_speed"),
+    ),
     "rig": ("gage_drift", "angle_zero"),
 }
 """Effects of the catalogue by part."""

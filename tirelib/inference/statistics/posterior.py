@@ -24,7 +24,8 @@ from tirelib.inference.statistics.plain import BASE, ROUGHLY, View
 from tirelib.inference.statistics.problem import Model, Point, Problem
 from tirelib.inference.statistics.quadratic import Ends, Quadratic
 
-MOST_STEPS = 60
+MOST_STEPS = 150
+"""Steps of a fit at most. Along the edge of a sliding tread one takes 84."""
 SETTLED = 0.1
 """Fall of the cost that a step has to promise, or a fit has settled, in units of a chi-square: as
 much as a number that moves by a third of its standard deviation. Where a model leaves more than a
