@@ -47,9 +47,9 @@ def downhill(
 ) -> Lower | None:
     """Return a point whose cost is lower as promised, by ever shorter steps; None if none is.
 
-    The damping is that of all coordinates, and each has its `own` (n_coordinates,) beside it. A law
-    may end where its range does. Where a step has no solution, one is tried that stays within
-    the ranges of strengths.
+    All coordinates share `damping`. To it each coordinate adds its `own`, (n_coordinates,). A law
+    may end where its range does: where a step has no solution, one is tried that stays within the
+    ranges of strengths.
     """
     inside = _inside(here, point)
     parabolas = (here, inside) if (inside.step() != here.step()).any() else (here,)

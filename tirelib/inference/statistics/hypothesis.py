@@ -60,8 +60,8 @@ class Hypothesis:
     further : mapping of name to float
         The same with each further effect, to first order, [nats].
     unnamed : float
-        Largest log likelihood with something without a name beside these effects, roughly right
-        laws or exact ones, [nats]. It is more of a group of smooth shapes than plain tires have.
+        Largest log likelihood where a cause without a name acts as well, [nats]. This cause is more
+        of a group of smooth shapes than plain tires have. Laws are roughly right, or exact.
     exact_plain : tuple of float
         `p_plain` of each effect with exact laws.
     rival : str

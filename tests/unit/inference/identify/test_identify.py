@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from proof.case import fingerprint
 from scipy import stats
 
 from tests.synthetic import header
@@ -148,3 +149,7 @@ def test_the_proof_holds_what_the_documentation_says() -> None:
     # of the strain of runs at a load or pressure that the fit has not seen
     for row in proof["held_out_ratio"].values():
         assert row["median"] * proof["rms_share"]["median"] <= 0.025
+
+
+def test_every_file_that_the_proof_depends_on_is_there() -> None:
+    assert re.fullmatch("[0-9a-f]{16}", fingerprint())
