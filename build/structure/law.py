@@ -4,7 +4,7 @@
 
 Fits every campaign with one known effect with that effect, and prints for each family the log
 likelihood of the relative standard deviation of a law
-(`tirelib.inference.statistics.hypothesis.LAWS`), summed over its campaigns. The other families'
+(`tirelib.inference.statistics.law_errors.LAWS`), summed over its campaigns. The other families'
 plain tires give the rest of the covariance.
 """
 
@@ -24,7 +24,7 @@ from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE
 from tirelib.inference.identify.campaign_data import straight_runs
 from tirelib.inference.problems.strain import StrainProblem
-from tirelib.inference.statistics.hypothesis import law_errors
+from tirelib.inference.statistics.law_errors import Errors, law_errors
 from tirelib.inference.statistics.null import OWN, Null
 from tirelib.inference.statistics.plain import BASE, Family, load, pooled
 from tirelib.inference.statistics.posterior import posterior, sizes_at_start
@@ -89,7 +89,7 @@ def likelihoods(file: Path, kind: str, others: list[Family], out: Path) -> np.nd
                     view,
                     family,
                     family.spread(fit.sizes),
-                    {BASE: fit.widths**2, **law_errors(fit, (law,), view)},
+                    {BASE: fit.widths**2, **law_errors(fit, Errors((law,), fit.lookalike), view)},
                     fit.sides,
                 ).likelihood
                 for family in others

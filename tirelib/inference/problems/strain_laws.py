@@ -27,7 +27,7 @@ SHARED = 5.0
 PARTS = {"k_u": "sidewall", "k_v": "sidewall", "k_t": "tread"}
 """Stiffnesses of a state, and the part of the tire (`FIELDS`) that they belong to."""
 GOES, SHAPED, SHAPED_BY_SPEED, PLACED = 1.7, 1.7, 0.7, 0.2
-"""Sizes of an error's parts over that of the law (`tirelib.inference.statistics.hypothesis.LAWS`):
+"""Sizes of an error's parts over that of the law (`tirelib.inference.statistics.law_errors.LAWS`):
 it goes otherwise with conditions, has another shape, one that goes with speed, is at another place
 or sharper. Root mean squares over twelve campaigns of the rig with a hidden effect are .35, .2, .07
 and .03, over four of the continuum .18, .25, .09 and .03."""

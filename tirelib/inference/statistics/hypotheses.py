@@ -22,6 +22,10 @@ from tirelib.inference.statistics.posterior import (
 from tirelib.inference.statistics.problem import Point, Problem
 from tirelib.inference.statistics.rival import p_against
 
+KINKED = 3.0
+"""A fit gains what it promised to first order, or up to so many times as much where a law has a
+kink: 35 campaigns, docs/theory/inference.md."""
+
 
 class Hypotheses:
     """Hypotheses about one problem, each fitted and tested once.
@@ -115,11 +119,16 @@ class Hypotheses:
         than plain tires show, it is something else that makes the runs likelier, and no effect is
         there.
         """
-        rival = max(self._larger(hypothesis), key=lambda h: h.exact, default=None)
+        larger = [
+            (h.exact_in[k], k, h)
+            for h in self._larger(hypothesis)
+            for k, name in enumerate(h.names)
+            if name not in hypothesis.names
+        ]
+        likelihood, further, rival = max(larger, key=lambda each: each[0], default=(0.0, 0, None))
         if hypothesis.p <= self.false_alarm or rival is None or not rival.plausible:
             return hypothesis
-        further = next(k for k, name in enumerate(rival.names) if name not in hypothesis.names)
-        ratio = min(hypothesis.unnamed - rival.exact, 0.0)
+        ratio = min(hypothesis.unnamed - likelihood, 0.0)
         p = self._count(hypothesis) * float(np.exp(ratio))
         if max(p, rival.exact_plain[further]) > self.false_alarm:
             return hypothesis
@@ -127,13 +136,18 @@ class Hypotheses:
         self._made[frozenset(self.added(hypothesis))] = out
         return out
 
-    def needed(self, hypothesis: Hypothesis) -> float:
-        """Return by how much one effect more has to raise `exact` to reject a hypothesis, [nats].
+    def may_reject(self, hypothesis: Hypothesis, name: str) -> bool:
+        """Return whether this effect beside a hypothesis promises enough to reject it.
 
-        See `against_larger`.
+        See `against_larger`. What it promises to first order is with laws that are exact, or with
+        the hypothesis' own.
         """
-        odds = self._count(hypothesis) / self.false_alarm
-        return float(hypothesis.unnamed - hypothesis.exact + np.log(odds))
+        odds = np.log(self._count(hypothesis) / self.false_alarm)
+        rough = max(null.gained[name] for null in hypothesis.nulls)
+        without = max(null.likelihood for null in hypothesis.nulls)
+        gains = hypothesis.further[name] - hypothesis.exact, rough - without
+        behind = hypothesis.likelihood - hypothesis.exact, 0.0
+        return any(KINKED * gain >= odds + less for gain, less in zip(gains, behind, strict=True))
 
     def _count(self, hypothesis: Hypothesis) -> int:
         """Return of how many effects one may be missing beside a hypothesis."""
@@ -158,8 +172,8 @@ class Hypotheses:
         if not larger or tuple(larger) == self.added(hypothesis):
             return hypothesis if larger else None
         found = self.at(larger)
-        if found is None:
-            return hypothesis  # the fit of fewer effects does not settle
+        if found is None or not found.plausible:
+            return hypothesis  # fewer effects have no fit, or one out of their ranges
         if found.p >= hypothesis.p:
             return found
         out = replace(found, p_beside=hypothesis.p)
@@ -193,6 +207,16 @@ class Hypotheses:
             and h.unnamed >= hypothesis.unnamed
         )
         return max(as_good, key=lambda h: h.likelihood, default=None)
+
+    def supported(self, hypothesis: Hypothesis) -> bool:
+        """Return whether its laws, taken as exact, explain the runs better than no effect does.
+
+        Where only the errors of laws make the runs likelier, something else is there. Each effect
+        is one of all that might be there, so that its likelihood ratio has to be n times 1 / alpha.
+        """
+        added = len(self.added(hypothesis))
+        odds = np.log(len(self.effects) / self.false_alarm)
+        return bool(hypothesis.exact - self.base.exact >= added * odds)
 
     def added(self, hypothesis: Hypothesis) -> tuple[str, ...]:
         """Return the names of a hypothesis' further effects."""

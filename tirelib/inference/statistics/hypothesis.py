@@ -17,19 +17,15 @@ import numpy as np
 from scipy.stats import chi2
 
 from tirelib.core.arrays import FloatArray
+from tirelib.inference.statistics.law_errors import LAWS, Errors, Likelihoods, law_errors
 from tirelib.inference.statistics.normal import blocks_of
 from tirelib.inference.statistics.null import OWN, PRIOR, Null, Products
-from tirelib.inference.statistics.plain import BASE, ROUGHLY, Family, View
+from tirelib.inference.statistics.plain import Family, View
 from tirelib.inference.statistics.posterior import Posterior
 from tirelib.inference.statistics.problem import Problem
 
-LAWS = (0.03, 0.1, 0.3)
-"""Relative standard deviations by which laws are off, each law by its own: a hypothesis stays if it
-does with the likeliest ones, or with the same for all."""
 USUAL = 0.15
-"""That of most laws."""
-LOOSEST = 1.0
-"""That which is tried where a hypothesis is rejected: its laws are off by as much as themselves."""
+"""Relative standard deviation by which most laws are off."""
 SLACK = 2.0
 """Standard deviations by which a strength may leave its range, those of its law included."""
 
@@ -45,11 +41,11 @@ class Hypothesis:
         The test by every family.
     plain : tuple of shape (n_tires,)
         Statistic of each plain tire by the families other than its own, by family.
-    laws : tuple of float
-        Relative standard deviation by which each law is off.
+    errors : Errors
+        By how much the laws are off.
     looseness : float
         By how much more laws have to be off for the hypothesis to stay: 1, or infinity if it is
-        rejected even with `LOOSEST`.
+        rejected even with the loosest.
     plausible : bool
         Whether the strengths lie in their ranges.
     likelihood : float
@@ -62,6 +58,8 @@ class Hypothesis:
     unnamed : float
         Largest log likelihood where a cause without a name acts as well, [nats]. This cause is more
         of a group of smooth shapes than plain tires have. Laws are roughly right, or exact.
+    exact_in : tuple of float
+        The same where the law of one effect is exact, for each effect in turn.
     exact_plain : tuple of float
         `p_plain` of each effect with exact laws.
     rival : str
@@ -76,13 +74,14 @@ class Hypothesis:
     fit: Posterior
     nulls: tuple[Null, ...]
     plain: tuple[FloatArray, ...]
-    laws: tuple[float, ...]
+    errors: Errors
     looseness: float
     plausible: bool
     likelihood: float
     exact: float
     further: Mapping[str, float]
     unnamed: float
+    exact_in: tuple[float, ...]
     exact_plain: tuple[float, ...]
     rival: str = ""
     p_rival: float = 1.0
@@ -176,43 +175,32 @@ def judged(
     own_effects : int
         How many of the fit's effects the model had already: they are part of it.
     """
-    views = fit.views(problem, OWN)
-    alike = list(dict.fromkeys(_each(fit, law) for law in LAWS))
-    found = {laws: _likeliest(views, fit, families, laws) for laws in alike}
-    laws = max(alike, key=lambda laws: found[laws][0])
-    for k in _vague(fit) if len(fit.effects) > 1 else ():
-        more = [(*laws[:k], law, *laws[k + 1 :]) for law in LAWS]
-        near = found[laws][1:]
-        found |= {m: _likeliest(near, fit, families, m) for m in more if m not in found}
-        laws = max(found, key=lambda laws: found[laws][0])
-    without = _each(fit, 0.0)
-    if without not in found:
-        found[without] = _likeliest(views, fit, families, without)
-    exact, at = found[without]
-    sharp = [_null(at, fit, family, without) for family in families]
-    loosest = _each(fit, LOOSEST)
-    likeliest = sorted(alike, key=lambda laws: -found[laws][0])
+    likelihoods = Likelihoods(fit, families, fit.views(problem, OWN))
+    likeliest, exact, loosest = likelihoods.likeliest, likelihoods.exact, likelihoods.loosest
     looseness = np.inf
-    for each in dict.fromkeys([laws, *likeliest, loosest]):
-        nulls, plain = _tested(fit, found.get(each, found[alike[-1]])[1], families, each)
+    for each in dict.fromkeys([likeliest, *likelihoods.alike, loosest]):
+        nulls = likelihoods.nulls(each)
+        plain = _calibrated(nulls, fit, each)
         stays = _p(np.array([_excusing(nulls).scores.max()]), plain)[0] > alpha
-        if each == laws or (stays and each != loosest):
+        if each == likeliest or (stays and each != loosest):
             kept = nulls, plain, each
         if stays:
-            looseness = max((*each, LAWS[-1])) / LAWS[-1]
+            looseness = max((*each.laws, LAWS[-1])) / LAWS[-1]
             break
-    likelihood = max(exact, found[laws][0])
+    sharp = likelihoods.nulls(exact)
     further = {name: max(null.gained[name] for null in sharp) for name in sharp[0].gained}
-    unnamed = max(likelihood + _unnamed(kept[0]), exact + _unnamed(sharp))
-    small = tuple(_p_plain(sharp, fit, k) for k in range(len(fit.effects)))
-    inside = plausible(fit, own_effects)
-    return Hypothesis(fit, *kept, looseness, inside, likelihood, exact, further, unnamed, small)
-
-
-def _unnamed(nulls: Sequence[Null]) -> float:
-    """Return by how much something without a name raises the log likelihood, [nats]."""
-    without = max(null.likelihood for null in nulls)
-    return max(null.unnamed for null in nulls) - without
+    return Hypothesis(
+        fit,
+        *kept,
+        looseness,
+        plausible(fit, own_effects),
+        likelihoods.of(likeliest),
+        likelihoods.of(exact),
+        further,
+        max(likelihoods.unnamed(each) for each in (likeliest, exact)),
+        tuple(likelihoods.exact_in(k) for k in range(len(fit.effects))),
+        tuple(_p_plain(sharp, fit, k) for k in range(len(fit.effects))),
+    )
 
 
 def _p_plain(nulls: Sequence[Null], fit: Posterior, index: int) -> float:
@@ -228,47 +216,19 @@ def _p_plain(nulls: Sequence[Null], fit: Posterior, index: int) -> float:
     return p
 
 
-def _vague(fit: Posterior) -> list[int]:
-    """Return the places of effects whose laws are only roughly right."""
-    return [k for k, effect in enumerate(fit.effects) if not effect.exact]
-
-
-def _each(fit: Posterior, law: float) -> tuple[float, ...]:
-    """Return one relative standard deviation for all laws that are only roughly right."""
-    return tuple(0.0 if effect.exact else law for effect in fit.effects)
-
-
-def _null(view: View, fit: Posterior, family: Family, laws: Sequence[float]) -> Null:
-    wide = fit.widths**2
-    wide[len(fit.point.base) :] *= PRIOR**2
-    allowed = {BASE: wide, **law_errors(fit, laws, view)}
-    return Null(view, family, family.spread(fit.sizes), allowed, fit.sides)
-
-
-def _likeliest(
-    views: Sequence[View], fit: Posterior, families: Sequence[Family], laws: Sequence[float]
-) -> tuple[float, View]:
-    """Return the largest likelihood over families and sizes of a run's own misfit, and its view."""
-    each = [max(_null(view, fit, f, laws).likelihood for f in families) for view in views]
-    return max(each), views[int(np.argmax(each))]
-
-
-def _tested(
-    fit: Posterior, at: View, families: Sequence[Family], laws: Sequence[float]
-) -> tuple[tuple[Null, ...], tuple[FloatArray, ...]]:
-    """Return the tests by every family, and the statistics of plain tires by the others."""
-    nulls = tuple(_null(at, fit, family, laws) for family in families)
-    plain = []
-    for family in families:
-        planted, noise = _drawn(fit, family, law_errors(fit, laws, at), at.white.shape[1])
-        turned = _products(at, noise + planted @ at.white)  # whitened
+def _calibrated(nulls: Sequence[Null], fit: Posterior, errors: Errors) -> tuple[FloatArray, ...]:
+    """Return the statistics of plain tires by the other families; tests learn what is usual."""
+    plain, view = [], nulls[0].view
+    for family in (null.family for null in nulls):
+        planted, noise = _drawn(fit, family, law_errors(fit, errors, view), view.white.shape[1])
+        turned = _products(view, noise + planted @ view.white)  # whitened
         plain.append([null.scores_of(turned) for null in nulls if null.family is not family])
     every = np.concatenate([scores for each in plain for scores in each], axis=1)
     mean, std = np.maximum(every.mean(axis=1), 0.0), np.maximum(every.std(axis=1), 1.0)
     for null in nulls:
         null.usual = mean, std
     standing = ((np.array(each) - mean[:, None]) / std[:, None] for each in plain)
-    return nulls, tuple(np.min(each.max(axis=1), axis=0) for each in standing)
+    return tuple(np.min(each.max(axis=1), axis=0) for each in standing)
 
 
 def _excusing(nulls: Sequence[Null]) -> Null:
@@ -333,46 +293,6 @@ def products(problem: Problem, view: View, tires: FloatArray) -> Products:
 
 def _products(view: View, white: FloatArray) -> Products:
     return view.white @ white.T, np.sum(white**2, axis=1)
-
-
-def law_errors(fit: Posterior, laws: Sequence[float], view: View) -> dict[str, float | FloatArray]:
-    """Return variances by block where each law is off by a relative standard deviation.
-
-    They come on top of what plain tires show. A law's error has shapes of its own. To some extent
-    it looks like each other effect: by the problem's share (`Model.lookalike`) of what the laws do
-    that the base cannot take. Exact laws have no error.
-    """
-    if not any(laws):
-        return {}
-    out: dict[str, float | FloatArray] = {
-        ROUGHLY + effect.name: law**2
-        for effect, law in zip(fit.effects, laws, strict=True)
-        if not effect.exact
-    }
-    if fit.lookalike:
-        square, others = _beyond_base(fit, view)
-        out |= {name: fit.lookalike**2 * square / other for name, other in others.items()}
-    return out
-
-
-def _beyond_base(fit: Posterior, view: View) -> tuple[float, dict[str, float]]:
-    """Return the square of what laws do that the base cannot take, and of other effects' rows.
-
-    The rows are of a strength of one range; an effect of which the base takes all is left out.
-    """
-    gram, first = view.normal.gram, len(fit.point.base)
-    base = gram[:first, :first] + np.diag(fit.widths[:first] ** -2)
-    left = gram - gram[:, :first] @ np.linalg.solve(base, gram[:first])
-    done = 0.0
-    for effect, size in zip(fit.effects, fit.point.ranges, strict=False):
-        own = slice(first, first + len(size))
-        done += 0.0 if effect.exact else float(size @ left[own, own] @ size)
-        first = own.stop
-    others = {
-        effect.name: float(np.mean(np.diag(left)[view.normal.blocks[effect.name]]))
-        for effect in fit.point.effects[fit.count :]
-    }
-    return done, {k: v for k, v in others.items() if v > 0.0}
 
 
 def plausible(fit: Posterior, own_effects: int) -> bool:

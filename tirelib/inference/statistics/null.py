@@ -88,6 +88,8 @@ class Null:
         What the hypothesis leaves open in addition to that.
     sides : mapping of block to sign
         Effects of one number whose range lies on this side of zero.
+    size : Size, optional
+        The only size of what the tire shows; the likeliest one by default.
 
     Attributes
     ----------
@@ -106,6 +108,7 @@ class Null:
         shown: Mapping[str, float],
         allowed: Mapping[str, float | FloatArray],
         sides: Mapping[str, float],
+        size: Size | None = None,
     ) -> None:
         blocks = view.normal.blocks
         self.view, self.family, self.shown, self.allowed = view, family, shown, allowed
@@ -119,11 +122,11 @@ class Null:
             self._shapes[block] = "," in name or name.startswith(ROUGHLY)
         self._weighed = []
         always = view.normal.spread(allowed)
-        for size in _sizes(family.largest, shown):
-            variance = {name: size.of(name) ** 2 * each for name, each in shown.items()}
+        for each in _sizes(family.largest, shown) if size is None else [size]:
+            variance = {name: each.of(name) ** 2 * square for name, square in shown.items()}
             spread = view.normal.spread(variance) + always
-            means = {name: size.of(name) * each for name, each in family.means.items()}
-            self._weighed.append((size, Weighed(view.normal.about(means), spread)))
+            means = {name: each.of(name) * mean for name, mean in family.means.items()}
+            self._weighed.append((each, Weighed(view.normal.about(means), spread)))
 
     @cached_property
     def _levels(self) -> FloatArray:
@@ -208,16 +211,14 @@ class Null:
         return np.where(self._shapes, MORE * weighed.root**2, PRIOR**2)
 
     @property
-    def size(self) -> "Size":
+    def size(self) -> Size:
         """The likeliest size of what this tire shows over what its family shows."""
         return self._weighed[int(np.argmax(self._levels))][0]
 
-    def about(self, view: View, size: "Size | None" = None) -> "Null":
+    def about(self, view: View, size: Size | None = None) -> "Null":
         """Return the same test of other normal equations, at one size of what the tire shows."""
-        other = Null(view, self.family, self.shown, self.allowed, self.sides)
+        other = Null(view, self.family, self.shown, self.allowed, self.sides, size)
         other.usual = self.usual
-        if size is not None:
-            other._weighed = [each for each in other._weighed if each[0] == size]
         return other
 
     def scores_of(self, products: Products, given: str = "") -> FloatArray:

@@ -12,7 +12,8 @@ about the two fits.
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.inference.statistics.hypothesis import Hypothesis, law_errors, plain_tires, products
+from tirelib.inference.statistics.hypothesis import Hypothesis, plain_tires, products
+from tirelib.inference.statistics.law_errors import law_errors
 from tirelib.inference.statistics.plain import BASE, Family
 from tirelib.inference.statistics.posterior import Posterior
 from tirelib.inference.statistics.problem import Problem
@@ -29,7 +30,7 @@ def p_against(problem: Problem, hypothesis: Hypothesis, rival: Hypothesis) -> fl
     fit = hypothesis.fit
     modelled = fit.rest - np.tensordot(_coordinates(fit), fit.rows[BASE], axes=1)
     view = hypothesis.null.view
-    laws, own = law_errors(fit, hypothesis.laws, view), view.own
+    laws, own = law_errors(fit, hypothesis.errors, view), view.own
     p = [float(np.exp(-ratio))]
     for family in (null.family for null in hypothesis.nulls):
         # what is measured where the hypothesis is true, less what is measured; first nothing

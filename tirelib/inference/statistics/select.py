@@ -35,10 +35,6 @@ MOST_EFFECTS = 3
 PROMISED = 0.1
 """Share of the most that any effect gains to first order below which an effect is not fitted. Half
 and double of it: docs/theory/verdict_numbers.md."""
-KINKED = 3.0
-"""A fit gains what it promised to first order, or up to so many times as much where a law has a
-kink: 35 campaigns, docs/theory/inference.md. Beside a hypothesis that stays, no effect is fitted
-that would not reject it then."""
 LOOKALIKE_ANGLE = np.deg2rad(80.0)
 """Angle between signatures below which one effect is tried in the place of another: it says what is
 tried, and not what is told."""
@@ -139,7 +135,7 @@ def select(
                     for h in fitted
                     if h.p > alpha
                     for name in _further(h, hypotheses.effects, FURTHER)
-                    if KINKED * (h.further[name] - h.exact) >= hypotheses.needed(h)
+                    if hypotheses.may_reject(h, name)
                 ]
             )
             fitted = [hypotheses.against_larger(h) for h in fitted]
@@ -150,7 +146,7 @@ def select(
             return done(*_smallest([hypotheses.without_plain(h) for h in members]))
         if staying:
             likeliest = max(filter(None, simpler.values()), key=lambda h: h.likelihood)
-            if likeliest is base:
+            if likeliest is base or not hypotheses.supported(likeliest):
                 return done("unknown", ())
             return done("form_inadequate", [likeliest])
         leaders = fitted[:LEADERS]
@@ -169,11 +165,12 @@ def select(
 def _with_loose_laws(hypotheses: Hypotheses) -> Hypothesis | None:
     """Return the smallest hypothesis that stays if its laws are off by as much as themselves.
 
-    It is the likeliest such of its size; one that is out of its range is not told.
+    It is the likeliest such of its size whose laws explain something; one that is out of its range
+    is not told.
     """
     for size in range(1, MOST_EFFECTS + 1):
         same = [h for h in hypotheses.tried if len(hypotheses.added(h)) == size]
-        loose = [h for h in same if 1.0 < h.looseness < np.inf]
+        loose = [h for h in same if 1.0 < h.looseness < np.inf and hypotheses.supported(h)]
         best = max(loose, key=lambda h: h.likelihood, default=None)
         if best is not None and best.plausible:
             return best

@@ -8,9 +8,9 @@ import pytest
 
 from tests.unit.inference.statistics.linear_problem import EFFECTS, N, Toy, by_effect, drawn, family
 from tirelib.core.arrays import FloatArray
-from tirelib.inference.statistics import select as select_
+from tirelib.inference.statistics import hypotheses
 from tirelib.inference.statistics.hypotheses import Hypotheses
-from tirelib.inference.statistics.hypothesis import LAWS
+from tirelib.inference.statistics.law_errors import LAWS
 from tirelib.inference.statistics.problem import Point
 from tirelib.inference.statistics.select import select
 
@@ -63,18 +63,16 @@ def test_an_effect_that_the_error_of_a_law_may_show_is_named_beside_an_exact_law
     assert alone.p == alone.p_rival <= 0.05
 
 
-@pytest.mark.parametrize("kinked", [select_.KINKED, 1e9])
+@pytest.mark.parametrize("kinked", [hypotheses.KINKED, 1e9])
 def test_one_effect_more_is_fitted_only_where_it_could_reject_the_hypothesis(
     kinked: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(select_, "KINKED", kinked)
+    monkeypatch.setattr(hypotheses, "KINKED", kinked)
     found = select(planted(60, twist=1.0), FAMILIES)
     assert found.sets == (("twist",),)
     alone = found.hypotheses.at(["twist"])
     assert alone is not None
-    need = found.hypotheses.needed(alone)
-    gains = [alone.further[name] - alone.exact for name in ("bend", "swell")]
-    worth = [kinked * gain >= need for gain in gains]
+    worth = [found.hypotheses.may_reject(alone, name) for name in ("bend", "swell")]
     assert any(len(h.names) > 1 for h in found.tried) is any(worth) is (kinked > 1e3)
 
 
@@ -102,8 +100,10 @@ def test_one_effect_more_has_to_be_likelier_than_something_without_a_name() -> N
     alone, both = among.at(["twist"]), among.at(["twist", "bend"])
     assert alone is not None
     assert both is not None
+    further = both.names.index("bend")
     for gain, gives_way in ((0.0, False), (10.0, True)):
-        among._made[frozenset(both.names)] = replace(both, exact=alone.unnamed + gain)
+        likelier = [alone.unnamed + gain if k == further else 0.0 for k in range(2)]
+        among._made[frozenset(both.names)] = replace(both, exact_in=tuple(likelier))
         assert bool(among.against_larger(alone).rival) is gives_way
 
 
@@ -115,7 +115,9 @@ def test_one_effect_more_is_not_there_if_one_out_of_its_range_is_likelier() -> N
     assert alone is not None
     assert both is not None
     assert other is not None
-    likelier = replace(other, exact=both.exact + 1.0, plausible=False)
+    likelier = replace(
+        other, exact_in=tuple(1.0 + max(both.exact_in) for _ in other.names), plausible=False
+    )
     among._made[frozenset(other.names)] = likelier
     assert among.against_larger(alone) is alone
     among._made[frozenset(other.names)] = other
