@@ -111,11 +111,11 @@ class Hypotheses:
         """Return a hypothesis that is not rejected with its p-value against one effect more.
 
         The error that a law may have covers what a further effect does, so that nothing stands out
-        beside it. Where that effect really acts, the runs are likelier with it and with exact laws
+        beside it. Where that effect really acts, the runs are likelier with it and its exact law
         than without it. Any of n effects may be the further one: a likelihood ratio of n / p in
         favour of one of them has at most the probability p where none is there (Bonferroni, and
         Royall as in `tirelib.inference.statistics.rival`). Something without a name may stand
-        beside the hypothesis. Where the likeliest further effect is out of its range, or no larger
+        beside either. Where the likeliest further effect is out of its range, or no larger
         than plain tires show, it is something else that makes the runs likelier, and no effect is
         there.
         """

@@ -1,0 +1,83 @@
+"""By how much laws are off: what is allowed for is what makes the runs likelier."""
+
+import numpy as np
+import pytest
+
+from tests.unit.inference.statistics.linear_problem import family
+from tests.unit.inference.statistics.test_larger import WAYS, Loud, planted
+from tirelib.inference.statistics.hypotheses import Hypotheses
+from tirelib.inference.statistics.hypothesis import Hypothesis
+from tirelib.inference.statistics.law_errors import LAWS, Likelihoods, law_errors
+from tirelib.inference.statistics.null import OWN
+
+FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
+
+
+def hypothesis(toy: Loud, *names: str) -> tuple[Hypothesis, Likelihoods, Hypotheses]:
+    among = Hypotheses(toy, FAMILIES)
+    found = among.at(names)
+    assert found is not None
+    likelihoods = Likelihoods(found.fit, FAMILIES, found.fit.views(among.problem, OWN))
+    return found, likelihoods, among
+
+
+@pytest.mark.parametrize(("also", "allowed"), [(0.0, False), (0.08, True)])
+def test_a_law_may_look_like_another_effect_where_that_is_likelier(
+    also: float, *, allowed: bool
+) -> None:
+    found, _, _ = hypothesis(planted(5, law=LAWS[1], twist=1.0, bend=also), "twist")
+    assert any(found.errors.laws)
+    assert bool(found.errors.lookalike) is allowed
+
+
+def test_an_exact_law_looks_like_nothing_else() -> None:
+    found, likelihoods, _ = hypothesis(planted(5, twist=1.0), "twist")
+    view = found.null.view
+    assert law_errors(found.fit, likelihoods.exact, view) == {}
+    one = likelihoods.alike[0].but(0, 0.0, found.fit.lookalike)
+    assert law_errors(found.fit, one, view) == {}
+
+
+def test_what_looks_like_another_effect_goes_with_what_the_rough_laws_do() -> None:
+    found, likelihoods, _ = hypothesis(planted(5, twist=1.0, swell=1.0), "twist", "swell")
+    view, share = found.null.view, found.fit.lookalike
+    both = likelihoods.loosest
+    whole = float(law_errors(found.fit, both, view)["bend"])
+    parts = [float(law_errors(found.fit, both.but(k, 0.0, share), view)["bend"]) for k in range(2)]
+    assert sum(parts) == pytest.approx(whole)
+    assert min(parts) > 0.1 * whole
+    double = law_errors(found.fit, both._replace(lookalike=2.0 * share), view)["bend"]
+    assert double == pytest.approx(4.0 * whole)
+
+
+def test_the_likeliest_errors_are_as_likely_as_any_others() -> None:
+    for law in (0.0, *LAWS):
+        _, found, _ = hypothesis(planted(9, law=law, twist=1.0, swell=1.0), "twist", "swell")
+        best = found.of(found.likeliest)
+        assert best >= max(found.of(each) for each in (*found.alike, found.exact, found.loosest))
+        uneven = found.likeliest.but(1, LAWS[2], 0.0)
+        assert best >= found.of(uneven) - 1e-9
+
+
+def test_one_exact_law_beside_rough_ones_is_between_all_exact_and_all_rough() -> None:
+    found, likelihoods, _ = hypothesis(
+        planted(9, law=LAWS[1], twist=1.0, swell=1.0), "twist", "swell"
+    )
+    exact = likelihoods.unnamed(likelihoods.exact)
+    # the law of the twist is off, and that of the swell may be off in the same ways
+    assert exact + 10.0 < min(found.exact_in)
+    assert max(found.exact_in) <= found.unnamed + 1e-9
+
+
+def test_a_law_whose_errors_explain_all_and_which_itself_explains_nothing_is_not_supported() -> (
+    None
+):
+    random = np.random.default_rng(3)
+    true, _, among = hypothesis(planted(4, twist=1.0), "twist")
+    assert among.supported(true)
+    assert among.supported(among.base)
+    toy = planted(4)
+    toy.measured = toy.measured + 2.0 / np.sqrt(WAYS) * random.standard_normal(WAYS) @ toy.ways
+    wrong, _, among = hypothesis(toy, "twist")
+    assert wrong.likelihood > wrong.exact + 20.0
+    assert not among.supported(wrong)
