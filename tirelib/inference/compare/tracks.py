@@ -7,7 +7,7 @@ import numpy as np
 from scipy import special
 
 from tirelib.campaign import Tolerance
-from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray, rms
 from tirelib.inference.compare.model import Prediction
 from tirelib.inference.compare.regions import LEAST_SHARE, LEVEL, SLIPS, subsets
 from tirelib.inference.compare.runs import Factor
@@ -82,12 +82,6 @@ def contact_edges(strain: FloatArray) -> FloatArray:
     entry = _peak(slope, (GRID < 0.0) & (GRID > -REACH))
     leaving = _peak(-slope, (GRID > 0.0) & (GRID < REACH))
     return np.stack([entry, leaving], axis=1)
-
-
-def contact_angle(strain: FloatArray) -> FloatArray:
-    """Return the angle from the steepest rise of strain to its steepest fall, (n_runs,), [rad]."""
-    edges = contact_edges(strain)
-    return np.asarray(edges[:, 1] - edges[:, 0])
 
 
 def tracks(
@@ -190,9 +184,7 @@ def track_fit(track: Track, counted: BoolArray) -> TrackFit:
     d = track.difference[shown]
     if not d.size:
         return TrackFit(0, *(4 * [float("nan")]))
-    return TrackFit(
-        d.size, float(d.mean()), _std(track, shown), float(np.sqrt(np.mean(d**2))), float(d.std())
-    )
+    return TrackFit(d.size, float(d.mean()), _std(track, shown), rms(d), float(d.std()))
 
 
 def track_sentences(

@@ -6,11 +6,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray, r_squared, rms
 from tirelib.core.errors import CalibrationError
 from tirelib.estimators.dissertation import Regression
+from tirelib.estimators.result import TRUTH
 from tirelib.estimators.train import Trained
-from tirelib.report.accuracy import FACTOR, TRUTH
+from tirelib.report.accuracy import SAID
 from tirelib.report.levels import Level, load_levels, reference_level
 from tirelib.report.style import (
     MARKERS,
@@ -91,14 +92,13 @@ def in_use(trained: Trained, quantity: str) -> tuple[FloatArray, FloatArray] | N
     links = trained.links
     if quantity not in links.held_out:
         return None
-    factor = FACTOR[quantity]
-    return links.truth[TRUTH[quantity]] * factor, links.held_out[quantity] * factor
+    said = SAID[quantity]
+    return said.told(links.truth[TRUTH[quantity]]), said.told(links.held_out[quantity])
 
 
-def rms(values: FloatArray) -> float:
+def known_rms(values: FloatArray) -> float:
     """Return the root mean square of the finite values."""
-    values = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
+    return rms(values[np.isfinite(values)])
 
 
 def largest(*parts: FloatArray) -> float:
@@ -136,38 +136,29 @@ def figure_4_4(trained: Trained) -> Figure:
     return figure
 
 
-@styled
 def figure_4_5(trained: Trained) -> Figure:
-    """Slip angle against the in/out ratio of the rate peaks with the quadratic and its residuals.
-
-    Source: dissertation, Fig. 4-5.
-
-    Raises
-    ------
-    CalibrationError
-        If the campaign did not vary the slip angle.
-    """
+    """Slip angle against the in/out ratio of the rate peaks (dissertation, Fig. 4-5)."""
     regressor = label("in/out ratio of peak strain rates", "-", signed=True)
     return _of_angle(trained, "Fig. 4-5", regressor, None)
 
 
-@styled
 def figure_4_7(trained: Trained) -> Figure:
-    """Slip angle against the slope of the peak rates, residuals, the estimator in use beside it.
+    """Slip angle against the slope of the peak rates (dissertation, Fig. 4-7)."""
+    regressor = label("slope of peak strain rates", "1/(rad m)", signed=True)
+    return _of_angle(trained, "Fig. 4-7", regressor, in_use(trained, "alpha"))
 
-    Source: dissertation, Fig. 4-7.
+
+@styled
+def _of_angle(trained: Trained, source: str, regressor: str, held: _InUse) -> Figure:
+    """Draw the polynomial, its residuals and, beside them, those of the estimator in use.
+
+    Thin lines are fits to one load each.
 
     Raises
     ------
     CalibrationError
         If the campaign did not vary the slip angle.
     """
-    regressor = label("slope of peak strain rates", "1/(rad m)", signed=True)
-    return _of_angle(trained, "Fig. 4-7", regressor, in_use(trained, "alpha"))
-
-
-def _of_angle(trained: Trained, source: str, regressor: str, held: _InUse) -> Figure:
-    """Draw a regression of the slip angle; thin lines are fits to one load each."""
     found = needed_regression(trained, source, "the slip angle", "slip angles")
     levels, rows = load_levels(trained.means.load), found.rows
     x, measured, degree = found.regressor, found.measured, len(found.terms) - 1
@@ -184,9 +175,8 @@ def _of_angle(trained: Trained, source: str, regressor: str, held: _InUse) -> Fi
         f"All loads R\u00b2 = {found.r2:.3f}; {reference.text} alone "
         f"R\u00b2 = {_alone(found, reference.rows[rows], degree):.3f}"
     )
-    low, high = float(measured.min()), float(measured.max())
-    room = 0.35 * (high - low)
-    panels[0].set_ylim(low - room, high + room)
+    room = 0.35 * float(np.ptp(measured))
+    panels[0].set_ylim(float(measured.min()) - room, float(measured.max()) + room)
     said = "Residuals: rms {:.2f} deg, held out {:.2f} deg"
     own_words = "Estimator in use, held out: rms {:.3f} deg"
     most = float(np.abs(measured).max()) + 0.5
@@ -199,8 +189,7 @@ def _alone(regression: Regression, rows: BoolArray, degree: int) -> float:
     x, y = regression.regressor[rows], regression.measured[rows]
     if x.size <= degree + 1:
         return float("nan")
-    rest = y - _FIT.polyval(x, _FIT.polyfit(x, y, degree))
-    return 1.0 - float(np.sum(rest**2) / np.sum((y - y.mean()) ** 2))
+    return r_squared(y, y - _FIT.polyval(x, _FIT.polyfit(x, y, degree)))
 
 
 def _panels(held: _InUse, height: float, widths: tuple[float, float]) -> tuple[Figure, list[Axes]]:
@@ -242,14 +231,14 @@ def _residuals(
     rest = found.measured - found.fitted
     half, levels = largest(rest), load_levels(trained.means.load)
     scatter_levels(panels[1], found.fitted, rest, levels, found.rows)
-    panels[1].set_title(said.format(rms(rest), found.cross_validated))
+    panels[1].set_title(said.format(known_rms(rest), found.cross_validated))
     if held is not None:
         measured, estimated = held
         rows = np.abs(measured) <= most
         error = (measured - estimated)[rows]
         own_levels = load_levels(trained.links.truth["Fz"])
         scatter_levels(panels[2], estimated[rows], error, own_levels, rows)
-        panels[2].set_title(own.format(rms(error)))
+        panels[2].set_title(own.format(known_rms(error)))
         half = largest(rest, error)
     for axes in panels[1:]:
         residual_panel(axes, half)
