@@ -103,8 +103,8 @@ def _curve(found: Sequence[ForceComparison], curve: Curve, name: str) -> Plot:
         (
             f"{start}-{name}",
             f"{name.capitalize()} {of}: {curve.words}",
-            f"{fall(sizes, first.unit, first.noise)} {curve.points} points. Models are computed at "
-            "the conditions of each point. Grey: 95 % of the noise.",
+            f"{fall(sizes, first.unit, first.noise)} The models are computed at "
+            f"the conditions of each of the {curve.points} points. Grey: 95 % of the noise.",
         ),
         lambda values, what, colour, which: dots(
             x, values, what, colour, 6, symbol=("circle-open", "x", "circle")[which]
