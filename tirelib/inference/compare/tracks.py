@@ -44,8 +44,6 @@ class Track:
         Noise of the measured number, from repeats; NaN without.
     freedom : int
         Degrees of freedom of the noise.
-    constant : bool
-        Whether the measured number may hold a constant error of the rig.
     """
 
     name: str
@@ -56,7 +54,11 @@ class Track:
     model_std: FloatArray
     noise: float
     freedom: int
-    constant: bool = False
+
+    @property
+    def constant(self) -> bool:
+        """Whether the measured number may hold a constant error of the rig."""
+        return self.name == "deflection"
 
     def in_noise(self, rms: float) -> float:
         """Return an rms in units of the noise; NaN where repeats are the same to the last digit."""
@@ -100,36 +102,23 @@ def tracks(
     ]
     lengths = [np.diff(edges, axis=1)[:, 0] for edges in (measured, model)]
     spread = np.hypot(*(np.diff(part, axis=1)[:, 0] for part in moved))
-    per_angle, unit, scale = np.ones(len(strain)), "deg", float(np.rad2deg(1.0))
+    degree = float(np.rad2deg(1.0))
+    per_angle, unit, scale = np.ones(len(strain)), "deg", degree
     if np.isfinite(radius).all():
         per_angle, unit, scale = radius, "mm", 1e3
-    length = [per_angle * part for part in (*lengths, spread)]
-    out = [_track("contact length", unit, scale, length, group)]
+    found = {"contact length": (unit, scale, [per_angle * part for part in (*lengths, spread)])}
     deflection = waves.header.tire.free_radius - c["loaded_radius"]
     if np.isfinite(deflection).any():
         by_load = np.abs(prediction.deflection_by_load) * tolerance.load
-        depth = [deflection, prediction.deflection, by_load]
-        out.append(_track("deflection", "mm", 1e3, depth, group, constant=True))
+        found["deflection"] = "mm", 1e3, [deflection, prediction.deflection, by_load]
     zero = np.minimum(waves.angle_std, 1.0)
     for side, name in enumerate(("contact entry", "contact exit")):
         std = np.sqrt(moved[0][:, side] ** 2 + moved[1][:, side] ** 2 + zero**2)
-        angle = [measured[:, side], model[:, side], std]
-        out.append(_track(name, "deg", float(np.rad2deg(1.0)), angle, group))
-    return tuple(out)
-
-
-def _track(
-    name: str,
-    unit: str,
-    scale: float,
-    numbers: Sequence[FloatArray],
-    group: IntArray,
-    *,
-    constant: bool = False,
-) -> Track:
-    measured, model, std = numbers
-    noise, freedom = pooled(measured - model, group)
-    return Track(name, unit, scale, measured, model, std, noise, freedom, constant)
+        found[name] = "deg", degree, [measured[:, side], model[:, side], std]
+    return tuple(
+        Track(name, unit, scale, *numbers, *pooled(numbers[0] - numbers[1], group))
+        for name, (unit, scale, numbers) in found.items()
+    )
 
 
 def pooled(values: FloatArray, group: IntArray) -> tuple[float, int]:

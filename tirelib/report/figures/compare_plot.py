@@ -31,6 +31,8 @@ MOST_NAMED_ROWS = 12
 SYMBOLS = ("circle", "square", "triangle-up", "diamond", "cross", "x")
 Trace = Mapping[str, Any]
 """Arguments of plotly's `add_scatter`."""
+Said = tuple[str, str, str]
+"""Name, title and caption of a plot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +126,7 @@ def styled_figure(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
 
 
 def curves(
-    said: tuple[str, str, str],
+    said: Said,
     draw: Callable[[FloatArray, str, str, int], Trace],
     measured: tuple[str, FloatArray],
     models: Sequence[tuple[FloatArray, FloatArray]],
@@ -136,8 +138,6 @@ def curves(
 
     Parameters
     ----------
-    said : (name, title, caption)
-        Of the plot.
     draw : callable
         Takes values, what they are, a colour, and 0 for the measurement, 1 and 2 for the models.
     measured : (text, values)
@@ -222,7 +222,7 @@ def heat(
 
 
 def turn_map(
-    said: tuple[str, str, str],
+    said: Said,
     z: FloatArray,
     labels: Sequence[str],
     marks: tuple[Sequence[float], Sequence[str], str],
@@ -234,8 +234,6 @@ def turn_map(
 
     Parameters
     ----------
-    said : (name, title, caption)
-        Of the plot.
     labels : sequence of str
         Of the rows: in the data and, where they are few, under the pointer.
     marks : (places, texts, title)
@@ -295,7 +293,7 @@ def _level_means(values: FloatArray, level: IntArray, count: int) -> FloatArray:
 
 
 def trend(
-    said: tuple[str, str, str],
+    said: Said,
     label: str,
     x: FloatArray,
     level: IntArray,
@@ -307,8 +305,6 @@ def trend(
 
     Parameters
     ----------
-    said : (name, title, caption)
-        Of the plot.
     label : str
         Axis of the condition.
     x : shape (n_levels,)
