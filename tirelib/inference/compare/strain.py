@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from tirelib.core.arrays import FloatArray, IntArray, rms
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray, rms
 from tirelib.inference.compare.error import (
     Floor,
     ModelError,
@@ -155,15 +155,8 @@ def compare_strain(waves: Waveforms, model: TireModel, data_hash: str = "") -> C
     tangent, rest = tangents(prediction), chosen.strain - prediction.strain
     points = _set_points(rest, tangent, scale, repeats.std, chosen)
     difference = points.shift - rest
-    left, size, p = rms(difference[counted]), rms(chosen.strain[counted]), float("nan")
-    if error.known:
-        freedom = points.independent * int(counted.sum())
-        p = float(special.fdtrc(freedom, repeats.freedom, error.value**2))
-    scaled = np.sqrt(np.mean(points.scaled[counted] ** 2, axis=0))
-    beyond = tuple(name for name, size in zip(SAID, scaled, strict=True) if size > BEYOND)
-    verdict = verdict_of(left / size, p)
-    if verdict == "fits" and beyond:
-        verdict = "lack_of_fit"
+    left, size = rms(difference[counted]), rms(chosen.strain[counted])
+    verdict, p, beyond = _judged(left / size, error, repeats, points, counted)
     sector = sectors_of(prediction.edges)
     regions: tuple[Region, ...] = ()
     if verdict == "lack_of_fit":
@@ -225,6 +218,19 @@ def _set_points(
     for part, rows in ((first, counted), (second, ~counted)):
         value[rows], shift[rows], covariance[rows] = part.value, part.shift, part.covariance
     return SetPoints(value, scale, covariance, tangent, shift, first.spread, first.independent)
+
+
+def _judged(
+    share: float, error: ModelError, noise: RepeatNoise, points: SetPoints, counted: BoolArray
+) -> tuple[str, float, tuple[str, ...]]:
+    """Return verdict, p-value and the set points that are beyond their tolerance."""
+    p = float("nan")
+    if error.known:
+        freedom = points.independent * int(counted.sum())
+        p = float(special.fdtrc(freedom, noise.freedom, error.value**2))
+    beyond = tuple(n for k, n in enumerate(SAID) if rms(points.scaled[counted, k]) > BEYOND)
+    verdict = verdict_of(share, p)
+    return "lack_of_fit" if verdict == "fits" and beyond else verdict, p, beyond
 
 
 def verdict_of(share: float, p: float) -> str:

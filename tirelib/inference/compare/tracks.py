@@ -116,8 +116,8 @@ def tracks(
         std = np.sqrt(moved[0][:, side] ** 2 + moved[1][:, side] ** 2 + zero**2)
         found[name] = "deg", degree, [measured[:, side], model[:, side], std]
     return tuple(
-        Track(name, unit, scale, *numbers, *pooled(numbers[0] - numbers[1], group))
-        for name, (unit, scale, numbers) in found.items()
+        Track(name, unit, scale, seen, said, std, *pooled(seen - said, group))
+        for name, (unit, scale, (seen, said, std)) in found.items()
     )
 
 

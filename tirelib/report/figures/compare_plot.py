@@ -174,10 +174,8 @@ def fall(rms: Sequence[float], unit: str, noise: float) -> str:
     """Say the rms difference of a model, or those of the models before and after a change."""
     said = [f"{value:.3g}" for value in rms]
     known = f", {rms[-1] / noise:.1f} noise" if np.isfinite(noise) else ""
-    was = (
-        f"The difference was {said[0]} {unit} rms and is " if len(rms) > 1 else "The difference is "
-    )
-    return f"{was}{said[-1]} {unit} rms{known}."
+    was = f"was {said[0]} and is now" if len(rms) > 1 else "is"
+    return f"The difference {was} {said[-1]} {unit} rms{known}."
 
 
 def heat(
