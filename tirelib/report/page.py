@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Required, TypedDict, TypeVar, Unpack
 
 from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -198,23 +198,33 @@ def write_page(
     return page
 
 
-HEAD: dict[str, Any] = {
-    "summary": "",
-    "messages": (),
-    "answer": "",
-    "lines": (),
-    "sentences": (),
-    "sentence_note": "",
-    "links": (),
-    "commands": (),
-}
-"""What stands above the parts of a page: its summary, what a reader has to know of the data, the
-result as a sentence or, instead, in a few lines (title, sentence), where the model fails and what
-holds for these sentences, other pages (title, address), and command lines that made it."""
+class Head(TypedDict, total=False):
+    """What stands above the parts of a page.
+
+    `messages` are what a reader has to know of the data; the result is the sentence `answer` or,
+    instead, a few `lines` (title, sentence); `sentences` say where the model fails, and
+    `sentence_note` what holds for them; `links` are other pages (title, address), and `commands`
+    the command lines that made it.
+    """
+
+    title: Required[str]
+    summary: str
+    messages: Sequence[str]
+    answer: str
+    lines: Sequence[tuple[str, str]]
+    sentences: Sequence[str]
+    sentence_note: str
+    links: Sequence[tuple[str, str]]
+    commands: Sequence[str]
 
 
 def write_parts_page(
-    folder: Path, name: str, parts: Sequence[Part], *, words: str | None = None, **head: Any
+    folder: Path,
+    name: str,
+    parts: Sequence[Part],
+    *,
+    words: str | None = None,
+    **head: Unpack[Head],
 ) -> tuple[Path, Path]:
     """Write ``<name>.html`` and a Markdown file into a folder; return their paths.
 
@@ -223,7 +233,7 @@ def write_parts_page(
     words : str, optional
         Name of the Markdown file; by default that of the page.
     **head
-        title, and what of `HEAD` there is.
+        What of `Head` there is.
 
     Raises
     ------
@@ -232,7 +242,7 @@ def write_parts_page(
     """
     from plotly.offline import get_plotlyjs  # slow to import
 
-    told = HEAD | head
+    told: dict[str, Any] = dict.fromkeys(Head.__annotations__, "") | head  # "" lists nothing
     figures = {plot.name: plot.figure.to_json() for part in parts for plot in part.plots}
     listed = ",".join(f"{json.dumps(name)}:{figure}" for name, figure in figures.items())
     scripts = {

@@ -121,11 +121,18 @@ def _cell(cell: Cell, noise: float) -> dict[str, Any]:
     }
 
 
-def _region(region: Region, found: Comparison) -> dict[str, Any]:
+def _where(region: Region, found: Comparison) -> dict[str, Any]:
     return {
         "sector": place(region, found.prediction.edges),
         "from_rad": region.start,
         "to_rad": region.stop,
+        "p": region.p,
+    }
+
+
+def _region(region: Region, found: Comparison) -> dict[str, Any]:
+    return {
+        **_where(region, found),
         "by": region.by,
         "side": region.side or None,
         "value": edge_value(region.by, region.value),
@@ -133,7 +140,6 @@ def _region(region: Region, found: Comparison) -> dict[str, Any]:
         "runs": region.runs,
         "mean": 1e6 * region.mean,
         "mean_std": 1e6 * region.std,
-        "p": region.p,
         "share": region.share,
     }
 
@@ -165,16 +171,12 @@ def _gage(gage: Gage, found: Comparison) -> dict[str, Any]:
         "rms": 1e6 * gage.rms,
         "rms_noise": gage.rms / gage.noise.std,
         "sectors": [_cell(cell, gage.noise.std) for cell in gage.table],
-        "departure": None
-        if departure is None
-        else {
-            "sector": place(departure.region, found.prediction.edges),
-            "from_rad": departure.region.start,
-            "to_rad": departure.region.stop,
+        "departure": departure
+        and {
+            **_where(departure.region, found),
             "mean": 1e6 * departure.mean,
             "mean_std": 1e6 * departure.std,
             "mean_of_all_gages": 1e6 * departure.of_all,
-            "p": departure.region.p,
         },
     }
 
