@@ -18,7 +18,7 @@ from ring_figures import loads as over_load
 
 from tirelib.core.parameters import Tire, read_tire
 from tirelib.core.threads import one_thread
-from tirelib.report.page import Drawing, Part, draw_all, write_page
+from tirelib.report.page import Part, Picture, draw_all, write_page
 from tirelib.report.simulation import Simulation
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -62,7 +62,7 @@ def standing(stiffness: float | None = None) -> cases.StaticRing:
     return cases.standing(own.changed(bending_stiffness=stiffness) if stiffness else own)
 
 
-def chapter_5() -> list[Drawing]:
+def chapter_5() -> list[Picture]:
     """Return the figures of the standing ring."""
     lumped = cases.LUMPED_STIFFNESS
     stiff = (
@@ -72,31 +72,31 @@ def chapter_5() -> list[Drawing]:
     )
     soft = "Standing ring of Table 6-1 as it is, without tension: the shape changes the other way."
     return [
-        Drawing(
+        Picture(
             "5-10",
             "Figure 5-10",
             f"Radial deformation from the ring's own strain. {stiff}",
             lambda: static.figure_5_10(standing(lumped)),
         ),
-        Drawing(
+        Picture(
             "5-22",
             "Figure 5-22 (a)",
             f"Static contact pressure by load. {stiff}",
             lambda: static.figure_5_22(standing(lumped)),
         ),
-        Drawing(
+        Picture(
             "5-22-soft",
             "Figure 5-22 (a), soft belt",
             f"Static contact pressure. {soft}",
             lambda: static.figure_5_22(standing()),
         ),
-        Drawing(
+        Picture(
             "5-24",
             "Figure 5-24 (b)",
             f"Static strain by load. {stiff}",
             lambda: static.figure_5_24(standing(lumped)),
         ),
-        Drawing(
+        Picture(
             "5-24-soft",
             "Figure 5-24 (b), soft belt",
             f"Static strain by load. {soft}",
@@ -105,11 +105,11 @@ def chapter_5() -> list[Drawing]:
     ]
 
 
-def section_6_4() -> list[Drawing]:
+def section_6_4() -> list[Picture]:
     """Return the figures that compare the two contacts."""
     both = ("shear", "radial")
     return [
-        Drawing(
+        Picture(
             "6-7",
             "Figure 6-7",
             "Contact pressure by deflection (Gong's tire) and by "
@@ -119,19 +119,19 @@ def section_6_4() -> list[Drawing]:
                 cases.by_inflation_at_equal_deflection(tire(LITERATURE_B)),
             ),
         ),
-        Drawing(
+        Picture(
             "6-9",
             "Figure 6-9",
             "Normal and horizontal traction of both contacts; Table 6-1 at 59 rad/s.",
             lambda: contact.figure_6_9(*map(deflections, both)),
         ),
-        Drawing(
+        Picture(
             "6-10",
             "Figure 6-10",
             "Strain with both contacts; Table 6-1 at 59 rad/s.",
             lambda: contact.figure_6_10(*map(deflections, both)),
         ),
-        Drawing(
+        Picture(
             "6-12",
             "Figure 6-12",
             "Peaks of the strain rate and edges of the contact; Table 6-1 at 59 rad/s.",
@@ -140,34 +140,34 @@ def section_6_4() -> list[Drawing]:
     ]
 
 
-def section_6_5() -> list[Drawing]:
+def section_6_5() -> list[Picture]:
     """Return the figures of the test tire without damping."""
     return [
-        Drawing(
+        Picture(
             "6-22",
             "Figure 6-22",
             "Traction by load, no damping; Table 6-2.",
             lambda: over_load.figure_6_22(loads("radial", 0.0, 0.0)),
         ),
-        Drawing(
+        Picture(
             "6-23",
             "Figure 6-23",
             "Traction by inflation, no damping; Table 6-2.",
             lambda: over_load.figure_6_23(inflations(0.0, 0.0)),
         ),
-        Drawing(
+        Picture(
             "6-24",
             "Figure 6-24",
             "Traction by load with tread shear, no damping; Table 6-2.",
             lambda: over_load.figure_6_24(loads("shear", 0.0, 0.0)),
         ),
-        Drawing(
+        Picture(
             "6-26",
             "Figure 6-26",
             "Strain and strain rate by load; Table 6-2. Fig. 6-25 is the measured counterpart.",
             lambda: over_load.figure_6_26(loads("radial", 0.0, 0.0)),
         ),
-        Drawing(
+        Picture(
             "6-28",
             "Figure 6-28",
             "Strain and strain rate by inflation; Table 6-2. Fig. 6-27 "
@@ -177,41 +177,41 @@ def section_6_5() -> list[Drawing]:
     ]
 
 
-def damping() -> list[Drawing]:
+def damping() -> list[Picture]:
     """Return the figures of the damped, rolling tire."""
     rolling = (cases.DYNAMIC_DAMPING, cases.DYNAMIC_SPEED)
     return [
-        Drawing(
+        Picture(
             "6-29",
             "Figure 6-29",
             "Damping and speed; Table 6-2.",
             lambda: speed.figure_6_29(speeds()),
         ),
-        Drawing(
+        Picture(
             "6-33",
             "Figure 6-33",
             "What moves with speed, and what Eq. (113) makes of it; Table 6-2.",
             lambda: speed.figure_6_33(speeds()),
         ),
-        Drawing(
+        Picture(
             "6-34",
             "Figure 6-34",
             "Traction by load, damped; Table 6-2.",
             lambda: over_load.figure_6_34(loads("radial", *rolling)),
         ),
-        Drawing(
+        Picture(
             "6-35",
             "Figure 6-35",
             "Traction by inflation at one load, damped; Table 6-2.",
             lambda: over_load.figure_6_35(inflations(*rolling)),
         ),
-        Drawing(
+        Picture(
             "6-36",
             "Figure 6-36",
             "Traction by load with tread shear, damped; Table 6-2.",
             lambda: over_load.figure_6_36(loads("shear", *rolling)),
         ),
-        Drawing(
+        Picture(
             "6-40",
             "Figure 6-40, 6-41",
             "Lateral traction and force at slip angles: pressure "

@@ -13,7 +13,7 @@ from typing import Any
 
 from tirelib.core.errors import CalibrationError
 from tirelib.estimators.edge import EDGE_UNIT
-from tirelib.report.accuracy import TITLE
+from tirelib.report.accuracy import SAID
 from tirelib.report.page import DASH, Table
 
 Turn = Mapping[str, Any]
@@ -64,7 +64,7 @@ class Agreement:
         limit = "exactly 0" if self.tolerance == 0.0 else f"below {self.tolerance:g}"
         found = [f"{self.title}: {text}" for text in self.apart]
         for row in self.rows:
-            if row.turns == 0 and row.title == TITLE["Fz"]:
+            if row.turns == 0 and row.title == SAID["Fz"].title:
                 found.append(f"{self.title}: not one turn with a {row.title} to compare")
             bad = row.relative > 0.0 if self.tolerance == 0.0 else row.relative >= self.tolerance
             if bad:
@@ -170,8 +170,8 @@ def _quantities(turns: Sequence[Turn]) -> list[tuple[str, str, list[str]]]:
     """Return title, unit and keys of all that is compared."""
     found = []
     for name, (unit, _) in EDGE_UNIT.items():
-        found.append((TITLE[name], unit, [name]))
-        found.append((f"standard deviation of {TITLE[name]}", unit, [f"{name}_std"]))
+        found.append((SAID[name].title, unit, [name]))
+        found.append((f"standard deviation of {SAID[name].title}", unit, [f"{name}_std"]))
     lengths = [key for key in (turns[0] if turns else ()) if key.startswith("contact_length_")]
     return [
         *found,

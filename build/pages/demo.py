@@ -26,8 +26,8 @@ from tirelib.report import figures
 from tirelib.report.accuracy import QUANTITIES, Accuracy, accuracy, compare
 from tirelib.report.calibration import regression_drawings
 from tirelib.report.estimate import accuracy_table
-from tirelib.report.figures.regression import find_regression, in_use, rms
-from tirelib.report.page import DASH, Drawing, Part, Table, draw_all, number, write_page
+from tirelib.report.figures.regression import find_regression, in_use, known_rms
+from tirelib.report.page import DASH, Part, Picture, Table, draw_all, number, write_page
 
 NEEDED = ("set1", "set1-unseen")
 OPTIONAL = ("set2", "brake_drive", "brake_drive-unseen", "set3")
@@ -175,7 +175,7 @@ def _comparison(trained: Trained) -> Table:
         if regression is None:
             continue
         unit = regression.unit
-        ours = number(rms(held[0] - held[1]), 3) if held else DASH
+        ours = number(known_rms(held[0] - held[1]), 3) if held else DASH
         rows.append(
             (
                 name,
@@ -205,7 +205,7 @@ def _comparison(trained: Trained) -> Table:
     )
 
 
-Drawn = tuple[str, str, str, list[Drawing]]
+Drawn = tuple[str, str, str, list[Picture]]
 
 
 def _parts(
@@ -216,7 +216,7 @@ def _parts(
     drawn = {drawing.name: drawing for drawing in regression_drawings(trained)}
     day = "Estimates on the unseen day."
     accuracy_drawings = [
-        Drawing(
+        Picture(
             f"accuracy_{name.replace('-', '_')}",
             f"Estimated against measured, {name.replace('-', ', ')}",
             "Each mark is one turn. Below: residuals with their 95 % intervals.",
@@ -233,7 +233,7 @@ def _parts(
             "contact",
             "Contact length is contact angle times effective rolling radius.",
             [
-                Drawing(
+                Picture(
                     "figure_4_2",
                     "Contact shapes at the middle load (Fig. 4-2)",
                     "The contact grows on the outer side of the corner and shrinks on the inner "
@@ -251,7 +251,7 @@ def _parts(
             [
                 drawn["figure_4_5"],
                 drawn["figure_4_7"],
-                Drawing(
+                Picture(
                     "figure_4_8",
                     "Slip angle turn after turn at all loads (Fig. 4-8)",
                     f"{day} Bars are 95 % intervals: wider where the cornering curve is flat.",
@@ -274,7 +274,7 @@ def _parts(
     return parts
 
 
-def _strain(part: Seen) -> list[Drawing]:
+def _strain(part: Seen) -> list[Picture]:
     plans = part.campaign.plans
 
     def free_turns() -> TypicalTurns:
@@ -290,7 +290,7 @@ def _strain(part: Seen) -> list[Drawing]:
         return typical_turns(part.campaign, [plan], [text])
 
     return [
-        Drawing(
+        Picture(
             "figure_3_7",
             "Strain and strain rate at several loads (Fig. 3-7, 3-8)",
             "Time runs to the right. The innerliner is compressed before the contact (CP1), "
@@ -298,7 +298,7 @@ def _strain(part: Seen) -> list[Drawing]:
             "degrees after its contact.",
             lambda: figure_3_7(free_turns()),
         ),
-        Drawing(
+        Picture(
             "figure_4_1",
             "All gages under slip, and the slope of their peak rates (Fig. 4-1, 4-6)",
             "CP1 and the peak rates differ across the tire. The slope of the peak rates over the "
@@ -320,18 +320,18 @@ def _cornering_run(plans: Sequence[RunPlan]) -> RunPlan:
     )
 
 
-def _camber(camber: Trained | None) -> list[Drawing]:
+def _camber(camber: Trained | None) -> list[Picture]:
     if camber is None:
         return []
     return [
-        Drawing(
+        Picture(
             "figure_4_14",
             "Lateral force under camber (Fig. 4-14)",
             "Six regressors refitted at each camber (left), one fit for all cambers (middle), and "
             "one estimator in use for all (right, held out).",
             lambda: figures.figure_4_14(camber),
         ),
-        Drawing(
+        Picture(
             "figure_4_16",
             "Slip and camber together (Fig. 4-16)",
             "Contact lengths at the outer gages stop changing after a few degrees (saturation). "
@@ -341,7 +341,7 @@ def _camber(camber: Trained | None) -> list[Drawing]:
     ]
 
 
-def _braking(seen: Mapping[str, Seen], calibration: Calibration) -> list[Drawing]:
+def _braking(seen: Mapping[str, Seen], calibration: Calibration) -> list[Picture]:
     unseen = "brake_drive-unseen" in seen
     part = seen["brake_drive-unseen" if unseen else "brake_drive"]
     plans = part.campaign.plans
@@ -355,7 +355,7 @@ def _braking(seen: Mapping[str, Seen], calibration: Calibration) -> list[Drawing
         return typical_turns(part.campaign, chosen, labels)
 
     return [
-        Drawing(
+        Picture(
             "figure_4_17",
             "Braking, driving and free rolling (Fig. 4-17)",
             "Braking deepens CP2, driving CP1. Below: the balance of every turn; turns inside the "
@@ -363,7 +363,7 @@ def _braking(seen: Mapping[str, Seen], calibration: Calibration) -> list[Drawing
             "beyond.",
             lambda: figure_4_17(turns(), part.observations, calibration.rolling),
         ),
-        Drawing(
+        Picture(
             "figure_4_18",
             "Slip ratio (Fig. 4-18)",
             "From the turn rate in the strain, the rolling radius and the travel speed. "
@@ -373,8 +373,8 @@ def _braking(seen: Mapping[str, Seen], calibration: Calibration) -> list[Drawing
     ]
 
 
-def _cut_off(part: Seen) -> Drawing:
-    return Drawing(
+def _cut_off(part: Seen) -> Picture:
+    return Picture(
         "cut_off",
         "Why the low-pass is set by order of the turn rate",
         "Shift: change of a feature from its value at order 24. Scatter: standard deviation over "

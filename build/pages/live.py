@@ -22,7 +22,7 @@ from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import CalibrationError
 from tirelib.measured.signal import LowPass, cut_turns
 from tirelib.report.accuracy import QUANTITIES
-from tirelib.report.page import Drawing, Table
+from tirelib.report.page import Picture, Table
 
 IN_REPORT = {"Fz": 1.0, "alpha": 1.0, "kappa": 100.0, "Fy": 1.0}
 """From the unit of the document to that of reports: a slip ratio is given in percent."""
@@ -127,9 +127,9 @@ def live_text(line: Line) -> str:
     )
 
 
-def live_drawing(files: LiveFiles, campaign: Campaign, low_pass: LowPass) -> Drawing:
+def live_drawing(files: LiveFiles, campaign: Campaign, low_pass: LowPass) -> Picture:
     """Return the strip: the last turn's strain, and every estimate with the rig's value."""
-    return Drawing(
+    return Picture(
         "live",
         "The live strip",
         "Top: strain of the last turn on the line. Below: estimates of the bench, turn after turn "

@@ -1,7 +1,6 @@
 """``tirelib diagnose``: which effect a model lacks."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,11 +91,10 @@ def write_told(
     effect_files: Sequence[Path] = (),
 ) -> None:
     """Say a diagnosis of a model in four lines and more, and write its page and its numbers."""
-    from tirelib.report.explanation import explained
+    from tirelib.report.explanation import explained, titled
 
-    explanation = explained(document, model_name, str(folder), effect_files)
-    document["explanation"] = asdict(explanation)
-    _say(document, explanation.lines)
+    document["explanation"] = explained(document, model_name, str(folder), effect_files)._asdict()
+    _say(document, titled(document["explanation"]))
     console = output()
     targets = [path for path in (json_file, out and out / "diagnosis.json") if path]
     if out is not None:

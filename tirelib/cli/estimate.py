@@ -121,7 +121,7 @@ def estimate(
         write_json(json_file, document)
         console.print(f"written: {json_file}")
     if report is not None:
-        from tirelib.report.calibration import write_estimate_report
+        from tirelib.report.estimate import write_estimate_report
 
         page = write_estimate_report(observations, estimates, calibration, report)
         console.print(f"written: {page}")

@@ -4,26 +4,24 @@ Errors are judged on the mean of a run's valid turns (on each turn in a sweep); 
 95 % intervals is counted over turns.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray, r_squared, rms
+from tirelib.core.quantities import Quantity
 from tirelib.estimators.estimate import Estimates
+from tirelib.estimators.result import TRUTH
 from tirelib.measured.observations import Observations, mean_by
 
-QUANTITIES = ("Fz", "alpha", "kappa", "Fy")
-TITLE = {
-    "Fz": "vertical load Fz",
-    "alpha": "slip angle",
-    "kappa": "slip ratio",
-    "Fy": "lateral force Fy",
+SAID = {
+    "Fz": Quantity("vertical load Fz", "force", "N"),
+    "alpha": Quantity("slip angle", "angle", "deg", signed=True),
+    "kappa": Quantity("slip ratio", "ratio", "%", signed=True),
+    "Fy": Quantity("lateral force Fy", "force", "N", signed=True),
 }
-UNIT = {"Fz": "N", "alpha": "deg", "kappa": "%", "Fy": "N"}
-FACTOR = {"Fz": 1.0, "alpha": float(180.0 / np.pi), "kappa": 100.0, "Fy": 1.0}
-TRUTH = {"Fz": "Fz", "alpha": "slip_angle", "kappa": "slip_ratio", "Fy": "Fy"}
-SIGNED = frozenset({"alpha", "kappa", "Fy"})
+"""How reports say what is estimated."""
+QUANTITIES = tuple(SAID)
 LEAST_RANGE = {"Fz": 200.0, "alpha": 0.5, "kappa": 1.0, "Fy": 200.0}
 """Range of the truth, in the report's unit, below which a share of it or an R2 says nothing."""
 WIDTH = 1.959964
@@ -74,9 +72,14 @@ class Accuracy:
 
 def compare(observations: Observations, estimates: Estimates, quantity: str) -> Compared:
     """Pick the valid turns of a quantity whose truth is known."""
-    factor = FACTOR[quantity]
-    truth = observations.truth[TRUTH[quantity]] * factor
-    value, std = estimates.value[quantity] * factor, estimates.std[quantity] * factor
+    truth, value, std = (
+        SAID[quantity].told(x)
+        for x in (
+            observations.truth[TRUTH[quantity]],
+            estimates.value[quantity],
+            estimates.std[quantity],
+        )
+    )
     rows = estimates.valid[quantity] & np.isfinite(truth) & np.isfinite(value)
     return Compared(
         quantity,
@@ -94,27 +97,24 @@ def accuracy(compared: Compared) -> Accuracy:
     measured = compared.means(compared.measured)
     error = compared.means(compared.estimated) - measured
     n = measured.size
-    rmse = float(np.sqrt(np.mean(error**2))) if n else np.nan
+    rmse = rms(error)
     spread = float(np.ptp(measured)) if n else 0.0
     varied = spread >= LEAST_RANGE[compared.quantity]
-    scatter = float(np.sum((measured - measured.mean()) ** 2)) if n else 0.0
     return Accuracy(
         quantity=compared.quantity,
-        title=TITLE[compared.quantity],
-        unit=UNIT[compared.quantity],
+        title=SAID[compared.quantity].title,
+        unit=SAID[compared.quantity].unit,
         runs=n,
         turns=compared.measured.size,
         turns_measured=compared.turns,
         rmse=rmse,
         percent_of_range=100.0 * rmse / spread if varied else np.nan,
-        r2=1.0 - float(np.sum(error**2)) / scatter if varied else np.nan,
+        r2=r_squared(measured, error) if varied else np.nan,
         coverage=float(np.mean(compared.inside)) if n else np.nan,
     )
 
 
-def accuracies(
-    observations: Observations, estimates: Estimates, quantities: Sequence[str] = QUANTITIES
-) -> list[Accuracy]:
+def accuracies(observations: Observations, estimates: Estimates) -> list[Accuracy]:
     """Return the accuracy table; a quantity without a single comparable turn is left out."""
-    rows = [accuracy(compare(observations, estimates, quantity)) for quantity in quantities]
+    rows = [accuracy(compare(observations, estimates, quantity)) for quantity in QUANTITIES]
     return [row for row in rows if row.turns]

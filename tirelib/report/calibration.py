@@ -12,9 +12,8 @@ from tirelib.core.errors import CalibrationError
 from tirelib.estimators.cornering import CorneringTrend
 from tirelib.estimators.train import Trained
 from tirelib.report import figures
-from tirelib.report.accuracy import QUANTITIES, TITLE
-from tirelib.report.estimate import write_estimate_report
-from tirelib.report.page import Drawing, Part, draw_all, number, write_page
+from tirelib.report.accuracy import QUANTITIES, SAID
+from tirelib.report.page import Part, Picture, draw_all, number, write_page
 from tirelib.report.statistics import (
     estimator_tables,
     held_out_table,
@@ -30,7 +29,6 @@ def write_calibration_report(
     folder: str | Path,
     *,
     held_out: Sequence[Mapping[str, Any]] = (),
-    title: str | None = None,
 ) -> Path:
     """Write ``index.html`` and its figures.
 
@@ -90,7 +88,7 @@ def write_calibration_report(
     return write_page(
         folder,
         "base.html",
-        title=title or f"Calibration: {calibration.tire}",
+        title=f"Calibration: {calibration.tire}",
         summary=f"Tire {calibration.tire}; gages at y = {gages} mm ({AXES_NAME}); "
         f"{trained.links.unit.size} independent measurements at "
         f"{np.unique(trained.links.groups).size} conditions; low-pass {low_pass}.",
@@ -98,11 +96,11 @@ def write_calibration_report(
     )
 
 
-def _residuals(trained: Trained) -> list[Drawing]:
+def _residuals(trained: Trained) -> list[Picture]:
     return [
-        Drawing(
+        Picture(
             f"residuals_{quantity}",
-            f"Residuals of the {TITLE[quantity]}",
+            f"Residuals of the {SAID[quantity].title}",
             "Against the estimate, the load and the slip angle; right: compared with a normal "
             "distribution. Each row has its own scale.",
             partial(figures.figure_residuals, trained, quantity),
@@ -170,11 +168,11 @@ _FIGURES: tuple[tuple[str, str, str, Callable[[Trained], Figure]], ...] = (
 """Number, title and caption of the figures of section 4.1, and how each is drawn."""
 
 
-def regression_drawings(trained: Trained) -> list[Drawing]:
+def regression_drawings(trained: Trained) -> list[Picture]:
     """Return the figures of section 4.1 that a calibration's data can inform."""
     cambers = any(r.source == "Table 4-2" for r in trained.regressions)
     return [
-        Drawing(
+        Picture(
             f"figure_{number.replace('-', '_')}",
             f"{title} (Fig. {number})",
             caption,
@@ -191,10 +189,3 @@ def _trend(trained: Trained) -> CorneringTrend:
             "the figure needs three loads with at least six slip angles each, without camber"
         )
     return trained.cornering
-
-
-__all__ = [
-    "regression_drawings",
-    "write_calibration_report",
-    "write_estimate_report",
-]

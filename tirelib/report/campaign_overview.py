@@ -9,19 +9,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tirelib.campaign.model import CampaignHeader, FloatArray, Run
-from tirelib.campaign.overview import COLUMNS, Column, RunRow, place_label
+from tirelib.campaign.overview import COLUMNS, RunRow, place_label
 from tirelib.campaign.turns import trigger_samples, turn_samples
+from tirelib.core.quantities import QUANTITIES
 from tirelib.core.units import from_si
-from tirelib.report.style import new_figure
+from tirelib.report.style import new_figure, zero_line
 
 _BY_NAME = {column.name: column for column in COLUMNS}
-_LABEL = {
+_TITLE = {
     "Fz": "vertical load Fz",
-    "pressure": "inflation pressure",
-    "speed": "speed",
-    "slip_angle": "slip angle",
-    "camber": "camber",
-    "slip_ratio": "slip ratio",
     "Fx": "longitudinal force Fx",
     "Fy": "lateral force Fy",
     "Mz": "aligning moment Mz",
@@ -63,14 +59,16 @@ def save_figure(figure: Figure, file: Path) -> Path:
 
 def _row_points(rows: Sequence[RunRow]) -> dict[str, FloatArray]:
     """Return measured means by quantity; the set point replaces a missing measurement."""
-    points: dict[str, FloatArray] = {}
-    for name in _BY_NAME:
-        values = [
-            row.planned.get(name) if row.measured[name] is None else row.measured[name]
-            for row in rows
-        ]
-        points[name] = np.array([np.nan if v is None else v for v in values], dtype=np.float64)
-    return points
+    return {
+        name: np.array(
+            [
+                row.planned.get(name) if row.measured[name] is None else row.measured[name]
+                for row in rows
+            ],
+            dtype=np.float64,  # None becomes NaN
+        )
+        for name in _BY_NAME
+    }
 
 
 def _sweep_points(runs: Sequence[Run]) -> dict[str, FloatArray]:
@@ -81,19 +79,15 @@ def _sweep_points(runs: Sequence[Run]) -> dict[str, FloatArray]:
             continue
         step = max(1, run.rig_time.size * len(runs) // _SWEEP_POINTS)
         for name, column in _BY_NAME.items():
-            samples = run.rig.get(name)
-            absent = np.full(run.rig_time.size, np.nan)
-            points[name].append((absent if samples is None else samples)[::step] * _scale(column))
+            samples = run.rig.get(name, np.full(run.rig_time.size, np.nan))[::step]
+            points[name].append(np.asarray(from_si(samples, column.unit, column.dimension)))
     return {name: np.concatenate(parts) if parts else np.empty(0) for name, parts in points.items()}
-
-
-def _scale(column: Column) -> float:
-    return from_si(1.0, column.unit, column.dimension)
 
 
 def _label(name: str) -> str:
     unit = _BY_NAME[name].unit
-    return f"{_LABEL[name]} [{'-' if unit == '1' else unit}]"
+    title = _TITLE[name] if name in _TITLE else QUANTITIES[name].title
+    return f"{title} [{'-' if unit == '1' else unit}]"
 
 
 def _spread(values: FloatArray) -> float:
@@ -132,7 +126,7 @@ def _draw_forces(
         return
     _scatter(axes, points, across, force, _second(points, [across]), sweep)
     axes.set_title("measured force" + (": samples" if sweep else ": mean of each run"))
-    axes.axhline(0.0, color="0.6", linewidth=0.8, zorder=0)
+    zero_line(axes)
 
 
 def _draw_loads(axes: Axes, rows: Sequence[RunRow]) -> None:
@@ -145,7 +139,7 @@ def _draw_loads(axes: Axes, rows: Sequence[RunRow]) -> None:
         return
     planned, measured = np.array(known).T
     axes.scatter(planned, 100.0 * (measured / planned - 1.0), s=26.0)
-    axes.axhline(0.0, color="0.6", linewidth=0.8, zorder=0)
+    zero_line(axes)
     axes.set_title("measured load against its set point")
     axes.set_xlabel("set point of the load [N]")
     axes.set_ylabel("measured / set point - 1 [%]")
@@ -180,11 +174,8 @@ def _one_turn(run: Run, header: CampaignHeader) -> tuple[FloatArray, FloatArray]
         fits = pulses[pulses + length <= run.strain.shape[1]]
         begin = int(fits[min(1, fits.size - 1)]) if fits.size else 0
     else:
-        middle = (
-            int(np.argmax(np.mean(run.strain[:, : 2 * length], axis=0)[length // 2 :]))
-            + length // 2
-        )
-        begin = max(0, min(middle - length // 2, run.strain.shape[1] - length))
+        begin = int(np.argmax(run.strain[:, length // 2 : 2 * length].mean(axis=0)))
+        begin = min(begin, run.strain.shape[1] - length)
     turn = run.strain[:, begin : begin + length]
     return np.linspace(-180.0, 180.0, length, endpoint=False), 1e6 * turn
 
@@ -213,7 +204,7 @@ def _conditions(run: Run) -> str:
         column = _BY_NAME[name]
         mean = run.mean(name)
         value = getattr(run.plan, column.planned) if mean is None else mean
-        value *= _scale(column)
+        value = from_si(value, column.unit, column.dimension)
         if not np.isfinite(value) or (name in ("camber", "slip_ratio") and abs(value) < 0.01):
             continue
         text = f"{value:.{column.digits}f}"

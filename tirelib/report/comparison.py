@@ -6,17 +6,16 @@ from typing import Any
 
 import numpy as np
 
+from tirelib.core.quantities import QUANTITIES
 from tirelib.inference.compare.document import comparison_document
 from tirelib.inference.compare.force_curves import Curve, curves_of
-from tirelib.inference.compare.forces import UNITS as FORCE_UNITS
 from tirelib.inference.compare.forces import ForceComparison, range_of
 from tirelib.inference.compare.sectors import SECTORS, Cell
 from tirelib.inference.compare.sentences import millimetres, told
-from tirelib.inference.compare.set_points import NAMES
+from tirelib.inference.compare.set_points import SAID
 from tirelib.inference.compare.strain import Comparison
 from tirelib.inference.compare.tracks import track_fit
 from tirelib.report.figures.compare_forces import curve_plots, force_plots, force_trends
-from tirelib.report.figures.compare_heat import NAMES as CONDITIONS
 from tirelib.report.figures.compare_heat import gage_plots, heat_maps, unit_of, waveform_plots
 from tirelib.report.figures.compare_trends import set_point_plot, track_plots, trend_plots
 from tirelib.report.page import Part, Table, number, numbers, unit_name, write_parts_page
@@ -117,7 +116,8 @@ def _floor(told: Mapping[str, Any]) -> str:
 
 def strain_parts(found: Comparison) -> list[Part]:
     """Return the parts of a page on strain."""
-    told = comparison_document(found)
+    told, base = comparison_document(found), RING if found.model.large else RING[:1]
+    sources = [*(f"{u.effect.name}: {u.effect.source}" for u in found.used), *base, *METHOD]
     return [
         Part("Noise, error, floor", "noise", _floor(told), tables=[number_table(told)]),
         Part(
@@ -138,7 +138,7 @@ def strain_parts(found: Comparison) -> list[Part]:
         ),
         Part("Table", "table", tables=sector_tables(found)),
         Part("Set points", "points", tables=[point_table(found)], plots=[set_point_plot(found)]),
-        Part("Sources", "sources", tables=_provenance(found), sources=_bibliography(found)),
+        Part("Sources", "sources", tables=_provenance(found), sources=sources),
     ]
 
 
@@ -155,7 +155,7 @@ def force_parts(found: ForceComparison) -> list[Part]:
             "curves",
             tables=[listed] if curves else (),
             text="" if curves else "No curve can be drawn: no set point has three points or more.",
-            plots=curve_plots(found, curves),
+            plots=curve_plots(found),
         ),
         Part("Trends", "trends", plots=force_trends(found)),
         Part("Table", "table", tables=[table]),
@@ -180,12 +180,6 @@ def _provenance(found: Comparison) -> list[Table]:
         texts=4,
     )
     return [effects, parameters] if used else [parameters]
-
-
-def _bibliography(found: Comparison) -> list[str]:
-    base = RING if found.model.large else RING[:1]
-    effects = [f"{u.effect.name}: {u.effect.source}" for u in found.model.used]
-    return [*effects, *base, *METHOD]
 
 
 def number_table(told: Mapping[str, Any]) -> Table:
@@ -228,7 +222,7 @@ def sector_tables(found: Comparison) -> list[Table]:
     for by in names:
         cells = [cell for cell in found.table if cell.by == by]
         cells.sort(key=lambda c: (np.nan_to_num(c.value), SECTORS.index(c.sector)))
-        title = "All straight, freely rolling runs" if by == "all" else f"By {CONDITIONS[by]}"
+        title = "All straight, freely rolling runs" if by == "all" else f"By {QUANTITIES[by].title}"
         out.append(
             Table.of(
                 title,
@@ -308,24 +302,16 @@ def track_table(found: Comparison) -> Table:
 
 def point_table(found: Comparison) -> Table:
     """Return the table of estimated set-point errors."""
-    scaled, tolerance = found.points.scaled, found.points.tolerance
-    rows = []
-    for k, name in enumerate(NAMES):
-        unit, factor = ("mrad", 1e3) if name == "angle" else ("%", 100.0)
-        worst = int(np.argmax(np.abs(scaled[:, k])))
-        rows.append(
-            [
-                "angle zero" if name == "angle" else name,
-                f"{number(factor * float(np.median(tolerance[:, k])), 3)} {unit}",
-                number(float(np.sqrt(np.mean(scaled[:, k] ** 2))), 3),
-                number(float(scaled[worst, k]), 3),
-                str(found.run[worst]),
-            ]
-        )
-    return Table(
+    return Table.of(
         "Random errors of the set points",
-        ["set point", "tolerance (1 sigma)", "rms [tolerance]", "largest [tolerance]", "in run"],
-        rows,
+        found.points.told(found.run),
+        {
+            "set point": lambda row: SAID[row["name"]][0],
+            "tolerance (1 sigma)": lambda row: f"{number(row['tolerance'], 3)} {row['unit']}",
+            "rms [tolerance]": lambda row: number(row["rms_in_tolerances"], 3),
+            "largest [tolerance]": lambda row: number(row["largest_in_tolerances"], 3),
+            "in run": lambda row: str(row["largest_run"]),
+        },
         texts=2,
         note="An rms far above 1 is a misfit of the model that looks like a set-point error; far "
         "below 1, the misfit hides the set-point errors.",
@@ -334,12 +320,12 @@ def point_table(found: Comparison) -> Table:
 
 def force_tables(found: ForceComparison, curves: tuple[Curve, ...]) -> tuple[Table, Table]:
     """Return a force's differences by condition, and its curves."""
-    unit = FORCE_UNITS[found.quantity]
+    unit = found.unit
     table = Table.of(
         "Difference, model minus measurement (slips by magnitude)",
         found.table,
         {
-            "by": lambda cell: CONDITIONS.get(cell.by, "all points"),
+            "by": lambda cell: "all points" if cell.by == "all" else QUANTITIES[cell.by].title,
             "range": range_of,
             "points": lambda cell: str(cell.points),
             f"rms [{unit}]": lambda cell: number(cell.rms, 3),

@@ -13,8 +13,8 @@ from tirelib.report.error_sentences import fold_name
 from tirelib.report.explanation import STANDS_OUT, mark_of, stands, titled
 from tirelib.report.figures.before_after import Step, waterfall, waterfall_of
 from tirelib.report.figures.compare_plot import Plot, styled_figure
-from tirelib.report.figures.left import force_maps, strain_maps
-from tirelib.report.page import Part, Table, number, numbers, unit_name, write_parts_page
+from tirelib.report.figures.left import maps
+from tirelib.report.page import TWINS, Part, Table, number, numbers, unit_name, write_parts_page
 from tirelib.report.style import BLUE, FAINT, INK, RED
 
 TITLE = "Which effect is missing"
@@ -63,10 +63,7 @@ def parts_of(
     history: Sequence[Mapping[str, Any]] = (),
 ) -> list[Part]:
     """Return the parts of the page."""
-    if isinstance(found, ForceAssessment):
-        maps, sources = force_maps(found), list(BRUSH)
-    else:
-        maps, sources = strain_maps(found), [*RING, *METHOD]
+    force = isinstance(found, ForceAssessment)
     effects = [*found.diagnosis.base.effects]
     effects += [f.effect for f in found.findings if f.level != "quiet"]
     shown = dict.fromkeys(f"{effect.name}: {effect.source}" for effect in effects)
@@ -74,17 +71,17 @@ def parts_of(
         Part(
             "Candidates",
             "candidates",
-            METHOD_TEXT + (FORCE_TEXT if isinstance(found, ForceAssessment) else ""),
+            METHOD_TEXT + FORCE_TEXT * force,
             tables=[_candidates(told)],
             plots=[_scores(told)] if told["candidates"] else [],
         ),
         Part("Error", "error", tables=[_errors(told)], plots=_falls(told, history)),
-        Part("What is left", "left", _left(told["unexplained"]), plots=maps),
+        Part("What is left", "left", _left(told["unexplained"]), plots=maps(found)),
         Part(
             "Effects that this plan cannot show", "blind", tables=dead_effects(told["dead_reasons"])
         ),
         Part("Next", "next", _advice(told["next_test"])),
-        Part("Sources", "sources", sources=[*shown, *sources]),
+        Part("Sources", "sources", sources=[*shown, *(BRUSH if force else (*RING, *METHOD))]),
     ]
 
 
@@ -115,9 +112,7 @@ def _candidates(told: Mapping[str, Any]) -> Table:
             "effect": lambda entry: entry["effect"],
             "level": lambda entry: mark_of(told, entry),
             "in range": lambda entry: "yes" if entry["in_range"] else "no",
-            "twins (angle)": lambda entry: ", ".join(
-                f"{twin['effect']} {twin['angle_deg']:.0f}\u00b0" for twin in entry["twins"]
-            ),
+            **TWINS,
             "score / threshold": lambda entry: number(entry["score"] / entry["threshold"], 3),
             "p": lambda entry: number(entry["p"], 2),
             "strength": lambda entry: numbers(np.atleast_1d(entry["strength"])),
@@ -219,8 +214,7 @@ def _falls(told: Mapping[str, Any], history: Sequence[Mapping[str, Any]]) -> lis
                 "Error as the named effects are added one after the other",
             )
         )
-    before = waterfall_of(history, told["quantity"])
-    return plots if before is None else [*plots, before]
+    return [*plots, *waterfall_of(history, told["quantity"])]
 
 
 def _left(unexplained: Mapping[str, Any]) -> str:

@@ -1,6 +1,6 @@
 """The error before and after, and what was held out, in sentences."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -70,23 +70,19 @@ def unmoved(told: Mapping[str, Any]) -> list[str]:
         ``tirelib-diagnosis/1``, ``tirelib-extension/1`` or ``tirelib-explanation/1``.
     """
     before, after = told["heldout_error_before"], told["heldout_error_after"]
-    pairs = [(f"The error of the {runs_or_points(told)} held out", before, after)]
-    folds = told["held_out"] if len(told["held_out"]) > 1 else ()
-    if all(is_known(before) and is_known(after) for _, before, after in pairs) and _none_fell(
-        folds
-    ):
+    what, folds = runs_or_points(told), told["held_out"] if len(told["held_out"]) > 1 else ()
+    ends = [(fold["error_before"], fold["error_after"]) for fold in folds]
+    whole = is_known(before) and is_known(after)
+    if len(folds) > 2 and whole and not any(_may_have_fallen(*pair) for pair in ends):
         return [
-            f"The error on the {runs_or_points(told)} held out fell in none of {len(folds)} parts: "
+            f"The error on the {what} held out fell in none of {len(folds)} parts: "
             f"{said_error(before)} before, {said_error(after)} after, on average."
         ]
-    pairs += [
-        (f"The error with {fold_name(fold)} held out", fold["error_before"], fold["error_after"])
-        for fold in folds
-    ]
+    names = [f"of the {what} held out", *(f"with {fold_name(fold)} held out" for fold in folds)]
     return [
-        f"{what} did not fall: {said_error(old)} before, {said_error(new)} after."
-        for what, old, new in pairs
-        if is_known(old) and is_known(new) and not _fell(old, new)
+        f"The error {name} did not fall: {said_error(old)} before, {said_error(new)} after."
+        for name, (old, new) in zip(names, [(before, after), *ends], strict=True)
+        if not _may_have_fallen(old, new)
     ]
 
 
@@ -126,12 +122,9 @@ def fold_name(fold: Mapping[str, Any]) -> str:
     return f"{names.get(fold['condition'], usual)} ({size})"
 
 
-def _none_fell(folds: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether there are several held-out parts and the error falls in none."""
-    ends = [(fold["error_before"], fold["error_after"]) for fold in folds]
-    return len(ends) > 2 and all(
-        is_known(old) and is_known(new) and not _fell(old, new) for old, new in ends
-    )
+def _may_have_fallen(before: Any, after: Any) -> bool:
+    """Whether an error fell, or is not known."""
+    return not (is_known(before) and is_known(after)) or _fell(before, after)
 
 
 def _fell(before: float, after: float) -> bool:

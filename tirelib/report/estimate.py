@@ -9,18 +9,13 @@ from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.estimate import Estimates
 from tirelib.measured.observations import Observations
 from tirelib.report import figures
-from tirelib.report.accuracy import QUANTITIES, TITLE, Accuracy, accuracies
-from tirelib.report.page import DASH, Drawing, Part, Table, draw_all, number, write_page
+from tirelib.report.accuracy import QUANTITIES, SAID, Accuracy, accuracies
+from tirelib.report.page import DASH, Part, Picture, Table, draw_all, number, write_page
 from tirelib.report.style import AXES_NAME
 
 
 def write_estimate_report(
-    observations: Observations,
-    estimates: Estimates,
-    calibration: Calibration,
-    folder: str | Path,
-    *,
-    title: str | None = None,
+    observations: Observations, estimates: Estimates, calibration: Calibration, folder: str | Path
 ) -> Path:
     """Write ``index.html`` and its figures; return the page."""
     folder = Path(folder)
@@ -29,7 +24,7 @@ def write_estimate_report(
     drawings = []
     if rows:
         drawings.append(
-            Drawing(
+            Picture(
                 "accuracy",
                 "Estimated against measured, turn by turn",
                 "Top: estimate against measurement; bottom: the residual with its 95 % interval.",
@@ -38,7 +33,7 @@ def write_estimate_report(
         )
     if any(row.quantity == "alpha" for row in rows):
         drawings.append(
-            Drawing(
+            Picture(
                 "figure_4_8",
                 "Slip angle turn after turn (Fig. 4-8)",
                 "Steps are measured, dots are estimated; each load has its own panel.",
@@ -64,7 +59,7 @@ def write_estimate_report(
     return write_page(
         folder,
         "base.html",
-        title=title or f"Estimates: {names}",
+        title=f"Estimates: {names}",
         summary=f"Tire {calibration.tire}; campaigns {names}; {len(observations)} turns, "
         f"{int(estimates.turn_valid.sum())} of them valid; calibrated gages at y = "
         f"{', '.join(number(1e3 * y, 3) for y in calibration.lateral)} mm ({AXES_NAME}).",
@@ -112,7 +107,7 @@ def _validity(estimates: Estimates, calibration: Calibration) -> Table:
         ("quantity", "valid turns", "of"),
         [
             (
-                TITLE[q],
+                SAID[q].title,
                 str(int(estimates.valid[q].sum())) if chain.has(q) else "not calibrated",
                 str(total),
             )

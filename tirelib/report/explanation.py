@@ -6,9 +6,8 @@ forces, so that console, page and file say the same.
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,25 +32,13 @@ SHOWN = 3
 """Other effects that a sentence lists by name."""
 
 
-@dataclass(frozen=True, slots=True)
-class Explanation:
-    """Four sentences.
-
-    Attributes
-    ----------
-    missing, sure, error, next : str
-        What is missing, how sure that is, what the error was and is, what to do.
-    """
+class Explanation(NamedTuple):
+    """Four sentences: what is missing, how sure that is, what the error was and is, what to do."""
 
     missing: str
     sure: str
     error: str
     next: str
-
-    @property
-    def lines(self) -> tuple[tuple[str, str], ...]:
-        """The sentences with what each is about."""
-        return titled(asdict(self))
 
 
 def titled(lines: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
@@ -96,8 +83,10 @@ def _missing(told: Mapping[str, Any]) -> str:
     if verdict == "indistinguishable":
         listed = " or ".join(f"{name} ({_title(told, name)})" for name in named)
         return f"One of these, and these measurements do not show which: {listed}."
+    entries = {name: _candidate(told, name) for name in named}
     effects = "; ".join(
-        f"{name} ({_title(told, name)}), strength {_strength(told, name)}" for name in named
+        f"{name} ({_title(told, name)}), strength {said_strength(entry) if entry else 'unknown'}"
+        for name, entry in entries.items()
     )
     if verdict != "form_inadequate":
         return f"{effects}."
@@ -136,15 +125,14 @@ def _sure(told: Mapping[str, Any]) -> str:
 
 def _doubts(told: Mapping[str, Any]) -> list[str]:
     """Return a sentence for each named effect whose strength is not plausible."""
-    out = []
-    for entry in filter(None, (_candidate(told, name) for name in told["named"])):
-        low, high = (number(end, 3) for end in entry["range"])
-        if not entry["in_range"]:
-            out.append(
-                f"The strength of {entry['effect']} is outside the plausible {low} to {high}: "
-                "measure it in another way before you believe it."
-            )
-    return out
+    named = filter(None, (_candidate(told, name) for name in told["named"]))
+    return [
+        f"The strength of {entry['effect']} is outside the plausible "
+        f"{' to '.join(number(end, 3) for end in entry['range'])}: measure it in another way "
+        "before you believe it."
+        for entry in named
+        if not entry["in_range"]
+    ]
 
 
 def _by_p(told: Mapping[str, Any]) -> str:
@@ -259,7 +247,7 @@ def journey_explained(
     folder, out : Path
         Folders of the campaign, and of the journey's files.
     """
-    lines = asdict(explained(told, journey["steps"][0]["model"], str(folder)))
+    lines = explained(told, journey["steps"][0]["model"], str(folder))._asdict()
     if journey["added"]:
         lines["error"] = error_line({**journey, "verdict": told["verdict"]})
         last = journey["steps"][-1]["model"]
@@ -309,11 +297,6 @@ def _title(told: Mapping[str, Any], name: str) -> str:
     entry = _candidate(told, name)
     title = str(entry["title"]).rstrip(".") if entry is not None else "in no catalogue"
     return title[0].lower() + title[1:]
-
-
-def _strength(told: Mapping[str, Any], name: str) -> str:
-    entry = _candidate(told, name)
-    return "unknown" if entry is None else said_strength(entry)
 
 
 def said_strength(entry: Mapping[str, Any]) -> str:

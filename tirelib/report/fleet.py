@@ -4,7 +4,8 @@ Every point and every row opens the page of its campaign or recording.
 """
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import plotly.graph_objects as go
 from markupsafe import Markup
 
 from tirelib.report.figures.compare_plot import Plot, dots, level_line, styled_figure
-from tirelib.report.page import DASH, Part, Table, number, write_parts_page
+from tirelib.report.page import DASH, INTERVAL, Columns, Part, Table, number, write_parts_page
 from tirelib.report.style import BLUE, FAINT, ORANGE, RED
 
 MOST_ROWS = 200
@@ -115,13 +116,18 @@ def fleet_parts(document: Mapping[str, Any]) -> list[Part]:
     return [part for part in parts if part.plots or part.tables]
 
 
+def _part(title: str, anchor: str, text: str, table: Table, plots: Sequence[Plot] = ()) -> Part:
+    """Return a part; a table without rows is left out, one with many is cut off."""
+    cut = replace(table, rows=table.rows[:MOST_ROWS])
+    return Part(title, anchor, text, [cut] if table.rows else [], plots)
+
+
 def _link(page: str, text: str) -> Markup:
     return Markup('<a href="{}">{}</a>').format(page, text) if page else Markup.escape(text)
 
 
-_Columns = Mapping[str, Callable[[Mapping[str, Any]], str]]
-_OF: _Columns = {"tire": lambda row: _link(row["page"], row["tire"])}
-_WHICH: _Columns = {
+_OF: Columns = {"tire": lambda row: _link(row["page"], row["tire"])}
+_WHICH: Columns = {
     "campaign": lambda row: _link(row["page"], row["name"]),
     "tire": lambda row: row["tire"],
     "task": lambda row: row["task"],
@@ -140,8 +146,7 @@ def _parameters(parameters: Sequence[Mapping[str, Any]]) -> Part:
             "parameter": lambda row: row["name"],
             "unit": lambda row: row["unit"],
             "value": lambda row: number(row["value"]),
-            "95 % from": lambda row: number(row["low"]),
-            "to": lambda row: number(row["high"]),
+            **INTERVAL,
             "mean of the others": lambda row: number(row["centre"]),
             "distance in std": lambda row: f"{row['score']:+.1f}",
         },
@@ -152,7 +157,7 @@ def _parameters(parameters: Sequence[Mapping[str, Any]]) -> Part:
         "twice the scatter between them. Orange: farther from the others than interval and "
         "scatter explain (on one page in fifteen by chance). A click on a point opens its page."
     )
-    return Part("Parameters over the tires", "parameters", text, [table] if odd else [], plots)
+    return _part("Parameters over the tires", "parameters", text, table, plots)
 
 
 def _parameter_plot(index: int, each: Mapping[str, Any]) -> Plot:
@@ -220,7 +225,7 @@ def _changes(changes: Sequence[Mapping[str, Any]]) -> Part:
         "Means of recordings over time, a line for each tire and wheel. Orange: steeper than "
         "the scatter about it explains; for the rolling radius pressure and load are taken out."
     )
-    return Part("Changes with time", "changes", text, [table] if table.rows else [], plots)
+    return _part("Changes with time", "changes", text, table, plots)
 
 
 def _change_plot(channel: str, series: Sequence[Mapping[str, Any]]) -> Plot:
@@ -255,7 +260,7 @@ def _effects(effects: Sequence[Mapping[str, Any]]) -> Part:
     names = sorted({name for each in effects for name in (*each["named"], *each["hints"])})
     table = Table.of(
         "Verdicts",
-        effects[:MOST_ROWS],
+        effects,
         {
             **_OF,
             "campaign": lambda each: each["campaign"],
@@ -267,7 +272,7 @@ def _effects(effects: Sequence[Mapping[str, Any]]) -> Part:
         texts=6,
     )
     plots = [_effect_plot(effects, names)] if names else []
-    return Part("Effects by tire", "effects", "", [table] if table.rows else [], plots)
+    return _part("Effects by tire", "effects", "", table, plots)
 
 
 def _effect_plot(effects: Sequence[Mapping[str, Any]], names: Sequence[str]) -> Plot:
@@ -314,7 +319,7 @@ def _joined(parameters: Sequence[Mapping[str, Any]]) -> Part:
     )
     table = Table.of(
         "Joined numbers",
-        rows[:MOST_ROWS],
+        rows,
         {
             **_OF,
             "parameter": lambda row: row["name"],
@@ -323,8 +328,7 @@ def _joined(parameters: Sequence[Mapping[str, Any]]) -> Part:
             "alone": lambda row: number(row["own"]),
             "std alone": lambda row: number(row["own_std"], 3),
             "joined": lambda row: number(row["value"]),
-            "95 % from": lambda row: number(row["low"]),
-            "to": lambda row: number(row["high"]),
+            **INTERVAL,
             "gain": lambda row: f"{row['gain']:.2f}",
         },
         texts=3,
@@ -335,13 +339,13 @@ def _joined(parameters: Sequence[Mapping[str, Any]]) -> Part:
         "Tires of one size are one population: a tire with few runs borrows from its siblings, as "
         "far as these scatter less than its own interval is wide."
     )
-    return Part("Joined tires", "joined", text, [table] if rows else [])
+    return _part("Joined tires", "joined", text, table)
 
 
 def _failures(failures: Sequence[Mapping[str, Any]]) -> Part:
     table = Table.of(
         "Failures by cause",
-        failures[:MOST_ROWS],
+        failures,
         {
             "task": lambda each: each["task"],
             "cause": lambda each: each["cause"],
@@ -354,14 +358,13 @@ def _failures(failures: Sequence[Mapping[str, Any]]) -> Part:
         },
         texts=4,
     )
-    tables = [table] if table.rows else []
-    return Part("Failures", "failures", "The same command tries them again.", tables)
+    return _part("Failures", "failures", "The same command tries them again.", table)
 
 
 def _negative(negative: Sequence[Mapping[str, Any]]) -> Part:
     table = Table.of(
         "Negative answers",
-        negative[:MOST_ROWS],
+        negative,
         {
             **_WHICH,
             "first reason": lambda each: each["first"].partition(";")[0],
@@ -370,7 +373,7 @@ def _negative(negative: Sequence[Mapping[str, Any]]) -> Part:
         texts=4,
     )
     text = "The work was done and its answer is no: a check found errors, or no turn is valid."
-    return Part("Negative answers", "negative", text, [table] if table.rows else [])
+    return _part("Negative answers", "negative", text, table)
 
 
 def _containers(containers: Sequence[Mapping[str, Any]]) -> Part:
@@ -381,7 +384,7 @@ def _containers(containers: Sequence[Mapping[str, Any]]) -> Part:
     )
     table = Table.of(
         "Pages of all",
-        containers[:MOST_ROWS],
+        containers,
         {
             **_WHICH,
             "path": lambda row: "; copy: ".join((row["file_path"], *row["copies"])),
@@ -390,4 +393,4 @@ def _containers(containers: Sequence[Mapping[str, Any]]) -> Part:
         note=note,
         folded=True,
     )
-    return Part("Campaigns and recordings", "containers", "", [table] if table.rows else [])
+    return _part("Campaigns and recordings", "containers", "", table)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tirelib.report.page import DASH, Part, Table, filled, number
+from tirelib.report.page import DASH, INTERVAL, Part, Table, filled, number
 
 REPORT_PAGES = {
     "calibrate": "index.html",
@@ -69,8 +69,7 @@ def _results(results: Sequence[Mapping[str, Any]]) -> Table:
             "flags": lambda row: (row.get("flags") or "").replace(";", ", "),
             "unit": lambda row: row.get("unit") or "",
             "value": lambda row: number(row["value"]),
-            "95 % from": lambda row: number(row.get("low")),
-            "to": lambda row: number(row.get("high")),
+            **INTERVAL,
         },
         texts=5,
     )

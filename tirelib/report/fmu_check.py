@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from tirelib.report.page import Drawing, Part, Table, draw_all, number, write_page
+from tirelib.report.page import Part, Picture, Table, draw_all, number, write_page
 from tirelib.report.style import BLUE, ORANGE, new_figure, styled
 
 Document = Mapping[str, Any]
@@ -43,7 +43,7 @@ def write_check(document: Document, folder: Path) -> Path:
     curves = document.get("curves")
     if curves:
         drawings.append(
-            Drawing(
+            Picture(
                 "outputs",
                 "Outputs and their reference signals",
                 "Broad line: reference signal in the FMU; thin line: output of this FMU here. SI "

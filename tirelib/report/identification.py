@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from tirelib.report.figures.compare_plot import DIVERGING, Plot, styled_figure
-from tirelib.report.page import DASH, Part, Table, number, write_parts_page
+from tirelib.report.page import DASH, INTERVAL, Part, Table, number, write_parts_page
 from tirelib.report.style import BLUE, FAINT, RED
 
 TITLE = "What the campaign says of the tire"
@@ -47,49 +47,28 @@ def write_identification(
 
 def parts_of(document: Mapping[str, Any]) -> list[Part]:
     """Return the parts of the page: ring, brush, and what belongs to each."""
-    parts = []
+    parts, brush = [], document["brush"]
     if document["parameters"]:
-        ring = {"names": _names(document["parameters"]), "values": document["correlation"]}
-        parts += [
-            Part(
-                "Ring",
-                "ring",
-                _ring_text(document),
-                tables=[
-                    _parameters("Parameters of the ring", document["parameters"]),
-                    _help(document["parameters"]),
-                ],
-                plots=[
-                    _intervals("ring-intervals", document["parameters"]),
-                    _correlation("ring-correlation", ring),
-                ],
-            )
-        ]
-    brush = document["brush"]
+        parts.append(_part("ring", _ring_text(document), document))
     if brush is not None:
-        fitted = {"names": _names(brush["parameters"]), "values": brush["correlation"]}
-        parts += [
-            Part(
-                "Brush",
-                "brush",
-                _brush_text(document),
-                tables=[
-                    _parameters("Parameters of the brush", brush["parameters"]),
-                    _help(brush["parameters"]),
-                    _stiffness(brush["stiffness"]),
-                    _left(document["forces"]),
-                ],
-                plots=[
-                    _intervals("brush-intervals", brush["parameters"]),
-                    _correlation("brush-correlation", fitted),
-                ],
-            )
-        ]
+        more = [_stiffness(brush["stiffness"]), _left(document["forces"])]
+        parts.append(_part("brush", _brush_text(document), brush, more))
     return parts
 
 
-def _names(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
-    return [entry["name"] for entry in parameters]
+def _part(name: str, text: str, found: Mapping[str, Any], more: Sequence[Table] = ()) -> Part:
+    """Return the part of one fit: its numbers, how well they are known, what would help."""
+    parameters, title = found["parameters"], f"Parameters of the {name}"
+    return Part(
+        name.capitalize(),
+        name,
+        text,
+        tables=[_parameters(title, parameters), _help(parameters), *more],
+        plots=[
+            _intervals(f"{name}-intervals", parameters),
+            _correlation(f"{name}-correlation", parameters, found["correlation"]),
+        ],
+    )
 
 
 def _answer(document: Mapping[str, Any]) -> str:
@@ -133,8 +112,7 @@ def _parameters(title: str, parameters: Sequence[Mapping[str, Any]]) -> Table:
             "meaning": lambda entry: entry["meaning"],
             "unit": lambda entry: entry["unit"],
             "value": lambda entry: number(entry["value"], 4),
-            "95 % from": lambda entry: number(entry["low"], 4),
-            "to": lambda entry: number(entry["high"], 4),
+            **INTERVAL,
         },
         texts=3,
     )
@@ -162,8 +140,7 @@ def _stiffness(entries: Sequence[Mapping[str, Any]]) -> Table:
             "load [N]": lambda entry: number(entry["load_N"], 4),
             "pressure [bar]": lambda entry: number(entry["pressure_bar"], 3),
             "value": lambda entry: number(entry["value"], 4),
-            "95 % from": lambda entry: number(entry["low"], 4),
-            "to": lambda entry: number(entry["high"], 4),
+            **INTERVAL,
             "unit": lambda entry: entry["unit"],
         },
     )
@@ -220,9 +197,11 @@ def _intervals(name: str, parameters: Sequence[Mapping[str, Any]]) -> Plot:
     )
 
 
-def _correlation(name: str, found: Mapping[str, Any]) -> Plot:
+def _correlation(
+    name: str, parameters: Sequence[Mapping[str, Any]], correlation: Sequence[Sequence[float]]
+) -> Plot:
     """Return the correlations of the fitted numbers, as a map."""
-    names, values = found["names"], np.array(found["values"], dtype=np.float64)
+    names, values = [entry["name"] for entry in parameters], np.array(correlation, dtype=float)
     figure = go.Figure(
         go.Heatmap(
             z=np.round(values, 3),

@@ -9,15 +9,9 @@ from tirelib.inference.compare.forces import ForceComparison
 from tirelib.inference.compare.strain import Comparison
 from tirelib.report.error_sentences import error_line, fold_name
 from tirelib.report.explanation import said_strength, titled
-from tirelib.report.figures.before_after import (
-    force_maps,
-    maps,
-    part_errors,
-    run_errors,
-    waterfall_of,
-)
-from tirelib.report.figures.compare_forces import force_curves
-from tirelib.report.figures.compare_heat import waveforms
+from tirelib.report.figures.before_after import maps, part_errors, run_errors, waterfall_of
+from tirelib.report.figures.compare_forces import curve_plots
+from tirelib.report.figures.compare_heat import waveform_plots
 from tirelib.report.page import Part, Table, number, unit_name, write_parts_page
 
 TITLE = "What the model lacked"
@@ -49,46 +43,34 @@ class Journey:
 def write_journey(journey: Journey, folder: Path) -> tuple[Path, Path]:
     """Write ``index.html`` and ``index.md`` into a folder; return their paths."""
     told = journey.document
-    links = [(page["title"], page["path"]) for page in told["pages"]]
     return write_parts_page(
         folder,
         "index",
         parts_of(journey),
         title=TITLE,
-        summary=_summary(told),
+        summary=f"Campaign {told['campaign']}, {told['quantity']}. Added to the model: "
+        f"{', '.join(told['added']) or 'nothing'}.",
         messages=told["messages"],
         lines=titled(told["explanation"]),
-        links=links,
+        links=[(page["title"], page["path"]) for page in told["pages"]],
         commands=told["commands"],
     )
-
-
-def _summary(told: Mapping[str, Any]) -> str:
-    added = ", ".join(told["added"]) or "nothing"
-    return f"Campaign {told['campaign']}, {told['quantity']}. Added to the model: {added}."
 
 
 def parts_of(journey: Journey) -> list[Part]:
     """Return the parts of the page."""
     before, after = journey.before, journey.after
-    if isinstance(before, ForceComparison) or isinstance(after, ForceComparison):
-        assert isinstance(before, ForceComparison)  # noqa: S101 - both are of one quantity
-        assert isinstance(after, ForceComparison)  # noqa: S101
-        curves, where, errors = (
-            force_curves(before, after),
-            force_maps(before, after),
-            part_errors(journey.document),
-        )
-    else:
-        curves, where = waveforms(before, after), maps(before, after)
+    if isinstance(before, ForceComparison) and isinstance(after, ForceComparison):
+        curves, errors = curve_plots(before, after), part_errors(journey.document)
+    elif isinstance(before, Comparison) and isinstance(after, Comparison):
+        curves = waveform_plots(before, after)
         errors = run_errors(journey.steps, before.error.unit)
-    fall = waterfall_of(journey.history, journey.document["quantity"])
     return [
         Part(
             "The error, step by step",
             "error",
             tables=[_table(journey)],
-            plots=[fall] if fall is not None else [],
+            plots=waterfall_of(journey.history, journey.document["quantity"]),
         ),
         Part(
             "Each part of the measurements, before and after",
@@ -97,7 +79,7 @@ def parts_of(journey: Journey) -> list[Part]:
             plots=errors,
         ),
         Part("Measured, before and after", "curves", plots=curves),
-        Part("Where the model fails, before and after", "maps", plots=where),
+        Part("Where the model fails, before and after", "maps", plots=maps(before, after)),
     ]
 
 
@@ -148,13 +130,12 @@ def write_extension(told: Mapping[str, Any], folder: Path) -> tuple[Path, Path]:
         ``tirelib-extension/1``.
     """
     done = {"add": "Added", "remove": "Removed"}[told["action"]]
-    fall = waterfall_of(told["history"], told["quantity"])
     parts = [
         Part(
             "The error, step by step",
             "error",
             tables=[_step_errors(told)],
-            plots=[fall] if fall is not None else [],
+            plots=waterfall_of(told["history"], told["quantity"]),
         ),
         Part(
             "Each part of the measurements, before and after",

@@ -1,6 +1,7 @@
 """Levels of a condition that was set a few times: loads, cambers, slip angles."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,7 +24,7 @@ class Level:
     text: str
 
 
-def find_levels(values: FloatArray, gap: float, text: str, digits: int = 0) -> list[Level]:
+def find_levels(values: FloatArray, gap: float, say: Callable[[float], str]) -> list[Level]:
     """Split values where neighbours lie further apart than `gap`, in rising order.
 
     Parameters
@@ -31,28 +32,21 @@ def find_levels(values: FloatArray, gap: float, text: str, digits: int = 0) -> l
     values : array, shape (n,)
         NaN belongs to no level.
     gap : float, unit of `values`
-    text : str
-        How to say a level, for example ``"{} N"``.
-    digits : int
-        As in `round`: -2 is to the hundred.
+    say : callable
+        The text of a level, from its mean.
 
     Examples
     --------
-    >>> [x.text for x in find_levels(np.array([5.0, 1.0, 5.2, np.nan]), 1.0, "{} N")]
+    >>> [x.text for x in find_levels(np.array([5.0, 1.0, 5.2, np.nan]), 1.0, "{:.0f} N".format)]
     ['1 N', '5 N']
     """
-    known = np.flatnonzero(np.isfinite(values))
-    order = known[np.argsort(values[known], kind="stable")]
-    if order.size == 0:
-        return []
-    cuts = np.flatnonzero(np.diff(values[order]) > gap) + 1
+    order = np.argsort(values, kind="stable")[: np.isfinite(values).sum()]  # NaN comes last
     found = []
-    for part in np.split(order, cuts):
-        rows = np.zeros(values.shape, dtype=np.bool_)
-        rows[part] = True
-        mean = float(values[part].mean())
-        shown = round(mean, digits) + 0.0
-        found.append(Level(mean, rows, text.format(f"{shown:.{max(digits, 0)}f}")))
+    for part in np.split(order, np.flatnonzero(np.diff(values[order]) > gap) + 1):
+        if part.size:
+            rows = np.isin(np.arange(values.size), part)
+            mean = float(values[part].mean())
+            found.append(Level(mean, rows, say(mean)))
     return found
 
 
@@ -65,22 +59,17 @@ def load_levels(load: FloatArray) -> list[Level]:
     if known.size == 0:
         return [Level(float("nan"), np.ones(load.shape, dtype=np.bool_), "load not measured")]
     gap = 0.06 * float(np.abs(known).mean())
-    return find_levels(load, gap, "{} N", -2)
+    return find_levels(load, gap, lambda mean: f"{round(mean, -2) + 0.0:.0f} N")
 
 
 def camber_levels(camber: FloatArray) -> list[Level]:
     """Return the camber angles of a campaign, [deg]."""
-    return [
-        replace(level, text=f"camber {signed_degrees(level.value)}")
-        for level in find_levels(camber, 0.5, "{}")
-    ]
+    return find_levels(camber, 0.5, lambda mean: f"camber {signed_degrees(mean)}")
 
 
 def angle_levels(angle: FloatArray) -> list[Level]:
     """Return the slip angles of a campaign, [deg]."""
-    return [
-        replace(level, text=signed_degrees(level.value)) for level in find_levels(angle, 0.4, "{}")
-    ]
+    return find_levels(angle, 0.4, signed_degrees)
 
 
 def upright(means: Means) -> BoolArray:

@@ -34,27 +34,18 @@ SHOWN = 20
 
 def write_next_test(plan: Plan, folder: Path) -> tuple[Path, Path]:
     """Write ``next_test.html`` and ``next_test.md``; return their paths."""
-    text = advice(plan)
+    text, names = advice(plan), ", ".join(plan.suspects.names) or "none"
+    left_out = {} if plan.test is None else plan.test.left_out
     return write_parts_page(
         folder,
         "next_test",
         parts_of(plan),
         title=TITLE,
-        summary=_summary(plan),
+        summary=f"Campaign {plan.campaign}, {plan.quantity}. Suspects: {names} "
+        f"({plan.suspects.why}).",
         answer=f"{text[0].upper()}{text[1:]}.",
-        messages=_messages(plan),
+        messages=[f"{name} is left out: {why}" for name, why in left_out.items()],
     )
-
-
-def _summary(plan: Plan) -> str:
-    names = ", ".join(plan.suspects.names) or "none"
-    return f"Campaign {plan.campaign}, {plan.quantity}. Suspects: {names} ({plan.suspects.why})."
-
-
-def _messages(plan: Plan) -> list[str]:
-    if plan.test is None:
-        return []
-    return [f"{name} is left out: {why}" for name, why in plan.test.left_out.items()]
 
 
 def parts_of(plan: Plan) -> list[Part]:
@@ -82,8 +73,8 @@ def parts_of(plan: Plan) -> list[Part]:
     ]
 
 
-def _said(pair: PairForecast) -> str:
-    return " / ".join(name.replace(NOTHING, "no effect") for name in pair.names)
+def _said(*names: str) -> str:
+    return " / ".join(name.replace(NOTHING, "no effect") for name in names)
 
 
 def _runs(test: NextTest) -> Table:
@@ -91,12 +82,12 @@ def _runs(test: NextTest) -> Table:
     rows = [
         [
             str(k + 1),
-            *_told(test, test.points[k]),
+            *(number(float(x), 4) for x in _told(test, test.points[k])),
             *swept,
             number(test.score[k], 3),
             number(float(test.std[k]), 2),
             number(100.0 * test.probability[k], 2),
-            _said(test.pairs[test.hardest[k]]),
+            _said(*test.pairs[test.hardest[k]].names),
         ]
         for k in range(min(SHOWN, len(test.points)))
     ]
@@ -113,10 +104,10 @@ def _runs(test: NextTest) -> Table:
     )
 
 
-def _told(test: NextTest, point: FloatArray) -> list[str]:
-    """Return a point's conditions in their units."""
-    pairs = zip(test.envelope.names, point, strict=True)
-    return [number(float(QUANTITIES[name].told(value)), 4) for name, value in pairs]
+def _told(test: NextTest, points: FloatArray) -> list[FloatArray]:
+    """Return the conditions of points, the last axis of an array, in their units."""
+    pairs = zip(test.envelope.names, np.moveaxis(points, -1, 0), strict=True)
+    return [np.asarray(QUANTITIES[name].told(values)) for name, values in pairs]
 
 
 def _envelope_text(test: NextTest) -> str:
@@ -210,21 +201,16 @@ def _map(test: NextTest, pair: PairForecast) -> Plot:
     )
     if others:
         note += " Conditions that are not drawn are those of the advised run."
-    return Plot(
+    headings = [QUANTITIES[name].heading for name in names]
+    data = {**dict(zip(headings, _told(test, test.points), strict=True))}
+    data |= {"separation": pair.separation, "chance to resolve": pair.probability}
+    return Plot.of(
         f"separation-{'-'.join(pair.names)}",
-        f"Separation of {_said(pair)}",
+        f"Separation of {_said(*pair.names)}",
         note,
         styled_figure(figure, 420, coloraxis=scale),
-        [*[QUANTITIES[name].heading for name in names], "separation", "chance to resolve"],
-        [_row(test, pair, k) for k in range(len(test.points))],
+        {name: [float(f"{x:.5g}") for x in values] for name, values in data.items()},
     )
-
-
-def _row(test: NextTest, pair: PairForecast, k: int) -> list[float]:
-    """Return a point as downloadable numbers."""
-    conditions = zip(test.envelope.names, test.points[k], strict=True)
-    told = [float(f"{float(QUANTITIES[name].told(value)):.5g}") for name, value in conditions]
-    return [*told, float(f"{pair.separation[k]:.5g}"), float(f"{pair.probability[k]:.4g}")]
 
 
 def _suspects(test: NextTest) -> Table:
@@ -232,7 +218,7 @@ def _suspects(test: NextTest) -> Table:
         "Suspects",
         test.rivals,
         {
-            "suspect": lambda rival: rival.name.replace(NOTHING, "no effect"),
+            "suspect": lambda rival: _said(rival.name),
             "in range": lambda rival: "yes" if rival.in_range else "no",
             "strength": lambda rival: numbers(rival.strength),
             "chi-square left": lambda rival: number(rival.cost, 4),
@@ -246,8 +232,8 @@ def _pairs(test: NextTest) -> Table:
         "Pairs",
         test.pairs,
         {
-            "pair": _said,
-            "better now": lambda pair: pair.better.replace(NOTHING, "no effect"),
+            "pair": lambda pair: _said(*pair.names),
+            "better now": lambda pair: _said(pair.better),
             "resolved now": lambda pair: "yes" if pair.resolved else "no",
             "chi-square apart now": lambda pair: number(abs(pair.gap), 3),
             "advised run adds": lambda pair: number(float(pair.separation[0]), 3),
@@ -261,7 +247,7 @@ def _repeats(plan: Plan, test: NextTest, pairs: tuple[PairForecast, ...]) -> Plo
     figure = go.Figure()
     rows = []
     for pair in pairs:
-        said, times = _said(pair), list(pair.repeats)
+        said, times = _said(*pair.names), list(pair.repeats)
         reached = np.round(list(pair.repeats.values()), 3)
         figure.add_scatter(x=times, y=reached, mode="lines+markers", name=said)
         ends, limit = [1, times[-1]], [pair.limit] * 2

@@ -3,9 +3,9 @@
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Required, TypedDict, TypeVar, Unpack
 
 from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -62,22 +62,16 @@ class Table:
 
 
 @dataclass(frozen=True, slots=True)
-class Drawing:
-    """A figure still to be drawn: file name, title, what to see in it, and how to draw it."""
-
-    name: str
-    title: str
-    caption: str
-    draw: Callable[[], Figure]
-
-
-@dataclass(frozen=True, slots=True)
 class Picture:
-    """A figure on disk; `reason` says why there is none."""
+    """A figure: file name, title, what to see in it, and how to draw it.
+
+    Once it is drawn it has files, the PNG and the SVG that it leads to; or `reason` says why not.
+    """
 
     name: str
     title: str
     caption: str
+    draw: Callable[[], Figure] | None = None
     file: str = ""
     vector: str = ""
     reason: str = ""
@@ -129,6 +123,21 @@ def unit_name(unit: str) -> str:
     return {"ustrain": "microstrain"}.get(unit, unit)
 
 
+Columns = Mapping[str, Callable[[Mapping[str, Any]], str]]
+"""Headings of a table of a document's entries, and what each cell says of an entry."""
+INTERVAL: Columns = {
+    "95 % from": lambda entry: number(entry.get("low")),
+    "to": lambda entry: number(entry.get("high")),
+}
+"""The ends of a 95 % interval."""
+TWINS: Columns = {
+    "twins (angle)": lambda entry: ", ".join(
+        f"{twin['effect']} {twin['angle_deg']:.0f}\u00b0" for twin in entry["twins"]
+    )
+}
+"""The effects whose signatures are like that of an effect."""
+
+
 def p_value(value: float) -> str:
     """Return a p-value in the form of statistics tables.
 
@@ -140,18 +149,18 @@ def p_value(value: float) -> str:
     return "< 0.001" if value < 0.001 else f"{value:.3f}"
 
 
-def draw_all(folder: Path, drawings: Sequence[Drawing]) -> list[Picture]:
+def draw_all(folder: Path, pictures: Iterable[Picture]) -> list[Picture]:
     """Draw figures into a folder; one that the data cannot inform is kept with the reason."""
-    pictures = []
-    for drawing in drawings:
-        said = drawing.name, drawing.title, drawing.caption
+    drawn = []
+    for each in pictures:
         try:
-            file = save(drawing.draw(), folder / "figures", drawing.name)
+            file = "" if each.draw is None else save(each.draw(), folder / "figures", each.name)
         except TirelibError as error:
-            pictures.append(Picture(*said, reason=str(error)))
+            drawn.append(replace(each, reason=str(error)))
         else:
-            pictures.append(Picture(*said, f"figures/{file}", f"figures/{drawing.name}.svg"))
-    return pictures
+            vector = f"figures/{each.name}.svg"
+            drawn.append(replace(each, file=f"figures/{file}", vector=vector) if file else each)
+    return drawn
 
 
 def filled(template: str | Path, **content: Any) -> str:
@@ -178,13 +187,35 @@ def filled(template: str | Path, **content: Any) -> str:
     return environment.get_template(template.name).render(known)
 
 
-def write_page(folder: Path, template: str | Path, **content: Any) -> Path:
-    """Fill a template and write it as ``index.html`` of the folder; values as of `filled`."""
+def write_page(
+    folder: Path, template: str | Path, name: str = "index.html", **content: Any
+) -> Path:
+    """Fill a template and write it into the folder, made if needed; values as of `filled`."""
     text = filled(template, **content)
     folder.mkdir(parents=True, exist_ok=True)
-    page = folder / "index.html"
+    page = folder / name
     page.write_text(text, encoding="utf-8")
     return page
+
+
+class Head(TypedDict, total=False):
+    """What stands above the parts of a page.
+
+    `messages` are what a reader has to know of the data; the result is the sentence `answer` or,
+    instead, a few `lines` (title, sentence); `sentences` say where the model fails, and
+    `sentence_note` what holds for them; `links` are other pages (title, address), and `commands`
+    the command lines that made it.
+    """
+
+    title: Required[str]
+    summary: str
+    messages: Sequence[str]
+    answer: str
+    lines: Sequence[tuple[str, str]]
+    sentences: Sequence[str]
+    sentence_note: str
+    links: Sequence[tuple[str, str]]
+    commands: Sequence[str]
 
 
 def write_parts_page(
@@ -192,37 +223,17 @@ def write_parts_page(
     name: str,
     parts: Sequence[Part],
     *,
-    title: str,
-    summary: str,
-    messages: Sequence[str] = (),
-    answer: str = "",
     words: str | None = None,
-    sentences: Sequence[str] = (),
-    sentence_note: str = "",
-    lines: Sequence[tuple[str, str]] = (),
-    links: Sequence[tuple[str, str]] = (),
-    commands: Sequence[str] = (),
+    **head: Unpack[Head],
 ) -> tuple[Path, Path]:
     """Write ``<name>.html`` and a Markdown file into a folder; return their paths.
 
     Parameters
     ----------
-    messages : sequence of str
-        What a reader has to know of the data.
-    answer : str
-        The result as a sentence.
     words : str, optional
         Name of the Markdown file; by default that of the page.
-    sentences : sequence of str
-        Where the model fails, below the answer.
-    sentence_note : str
-        What holds for the sentences.
-    lines : sequence of (title, sentence)
-        The result in a few lines at the head of the page, in the place of `answer`.
-    links : sequence of (title, address)
-        Titles and addresses of other pages, relative to the folder.
-    commands : sequence of str
-        Command lines that made it.
+    **head
+        What of `Head` there is.
 
     Raises
     ------
@@ -231,35 +242,25 @@ def write_parts_page(
     """
     from plotly.offline import get_plotlyjs  # slow to import
 
+    told: dict[str, Any] = dict.fromkeys(Head.__annotations__, "") | head  # "" lists nothing
     figures = {plot.name: plot.figure.to_json() for part in parts for plot in part.plots}
     listed = ",".join(f"{json.dumps(name)}:{figure}" for name, figure in figures.items())
-    folder.mkdir(parents=True, exist_ok=True)
-    page, text = folder / f"{name}.html", folder / f"{words or name}.md"
-    page.write_text(
-        filled(
-            "page.html",
-            title=title,
-            sections=parts,
-            summary=summary,
-            answer=answer,
-            messages=messages,
-            sentences=sentences,
-            sentence_note=sentence_note,
-            lines=lines,
-            links=links,
-            commands=commands,
-            plotly=Markup(get_plotlyjs()),
-            figures=Markup("{" + listed.replace("</", "<\\/") + "}"),
-        ),
-        encoding="utf-8",
-    )
-    head = [f"- **{what}**: {said}" for what, said in lines] or [f"**{answer}**"]
-    out = [f"# {title}", "", summary, "", *head, ""]
-    out += [f"> {message}\n" for message in messages]
-    if sentences:
-        out += ["## Lack of fit", "", *(f"- {said}" for said in sentences), "", sentence_note, ""]
-    out += [*(f"- [{what}]({address})" for what, address in links), ""] if links else []
-    out += ["```", *commands, "```", ""] if commands else []
+    scripts = {
+        "plotly": Markup(get_plotlyjs()),
+        "figures": Markup("{" + listed.replace("</", "<\\/") + "}"),
+    }
+    page = write_page(folder, "page.html", f"{name}.html", sections=parts, **scripts, **told)
+    lines = [f"- **{what}**: {said}" for what, said in told["lines"]] or [f"**{told['answer']}**"]
+    out = [f"# {told['title']}", "", told["summary"], "", *lines, ""]
+    out += [f"> {message}\n" for message in told["messages"]]
+    if told["sentences"]:
+        out += ["## Lack of fit", "", *(f"- {said}" for said in told["sentences"])]
+        out += ["", told["sentence_note"], ""]
+    if told["links"]:
+        out += [*(f"- [{what}]({address})" for what, address in told["links"]), ""]
+    if told["commands"]:
+        out += ["```", *told["commands"], "```", ""]
+    text = folder / f"{words or name}.md"
     text.write_text("\n".join([*out, *markdown_parts(parts)]).rstrip() + "\n", encoding="utf-8")
     return page, text
 

@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 
 from tirelib.report.diagnosis import dead_effects
 from tirelib.report.figures.compare_plot import Plot, styled_figure
-from tirelib.report.page import DASH, Part, Table, number, write_parts_page
+from tirelib.report.page import DASH, TWINS, Part, Table, number, write_parts_page
 
 TITLE = "Effects that this plan can find"
 
@@ -20,17 +20,11 @@ def write_selftest(document: Mapping[str, Any], folder: Path) -> tuple[Path, Pat
         "selftest",
         parts_of(document),
         title=TITLE,
-        summary=_summary(document),
+        summary=f"Campaign {document['campaign']}, strain; {document['repeats']} tires for each "
+        f"effect and error ratio; false-alarm probability {document['false_alarm']:g}, seed "
+        f"{document['seed']}.",
         answer=_answer(document),
         messages=[document["note"]],
-    )
-
-
-def _summary(document: Mapping[str, Any]) -> str:
-    return (
-        f"Campaign {document['campaign']}, strain; {document['repeats']} tires for each effect "
-        f"and error ratio; false-alarm probability {document['false_alarm']:g}, seed "
-        f"{document['seed']}."
     )
 
 
@@ -117,9 +111,7 @@ def _effects(document: Mapping[str, Any]) -> Table:
         {
             "effect": lambda row: row["effect"],
             "in a set": lambda row: ", ".join(row["named"]),
-            "twins (angle)": lambda row: ", ".join(
-                f"{twin['effect']} {twin['angle_deg']:.0f}\u00b0" for twin in row["twins"]
-            ),
+            **TWINS,
             "error ratio": lambda row: number(row["ratio"]),
             "strength": lambda row: number(row["strength"], 3),
             "unit": lambda row: row["unit"],

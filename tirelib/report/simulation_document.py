@@ -14,20 +14,14 @@ FORMAT = "tirelib-simulation/1"
 
 def point_document(done: Simulation, point: int) -> dict[str, Any]:
     """Return the keys of one operating point as `tirelib simulate --json` has them."""
-    peaks = done.peaks
     per_second = float(done.turn_rate[point])
 
-    def strain_peak(name: str) -> dict[str, float]:
-        value, angle = getattr(peaks, name)[point], getattr(peaks, f"{name}_angle")[point]
-        return {"ustrain": MICRO * float(value), "angle_rad": float(angle)}
+    def peak(name: str, **factors: float) -> dict[str, float]:
+        value, angle = (getattr(done.peaks, key)[point] for key in (name, f"{name}_angle"))
+        told = {unit: MICRO * factor * float(value) for unit, factor in factors.items()}
+        return told | {"angle_rad": float(angle)}
 
-    def rate_peak(name: str) -> dict[str, float]:
-        value, angle = getattr(peaks, name)[point], getattr(peaks, f"{name}_angle")[point]
-        return {
-            "ustrain_per_rad": MICRO * float(value),
-            "ustrain_per_s": MICRO * per_second * float(value),
-            "angle_rad": float(angle),
-        }
+    rates = {"ustrain_per_rad": 1.0, "ustrain_per_s": per_second}
 
     return {
         "Fz_N": float(done.load[point]),
@@ -40,8 +34,8 @@ def point_document(done: Simulation, point: int) -> dict[str, Any]:
         "q_center_N_per_m": float(done.middle_pressure[point]),
         "q_max_N_per_m": float(done.largest_pressure[point]),
         "pressure_center_mm": 1e3 * float(done.pressure_centre[point]),
-        "strain_peaks": {name: strain_peak(name) for name in ("cp1", "tp", "cp2")},
-        "strain_rate_peaks": {"lead": rate_peak("rate_lead"), "trail": rate_peak("rate_trail")},
+        "strain_peaks": {name: peak(name, ustrain=1.0) for name in ("cp1", "tp", "cp2")},
+        "strain_rate_peaks": {side: peak(f"rate_{side}", **rates) for side in ("lead", "trail")},
         "effective_radius_mm": _known(done.effective_radius, point, 1e3),
         "torque_Nm": _known(done.torque, point, 1.0),
         "sliding_from_rad": _known(done.sliding_onset, point, 1.0),

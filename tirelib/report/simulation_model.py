@@ -19,7 +19,7 @@ from tirelib.inference.compare.model import TireModel
 from tirelib.measured.signal import LowPass
 from tirelib.model.base import predict
 from tirelib.model.solution import Solution, solved
-from tirelib.physics.ring.ring import ComplexArray
+from tirelib.physics.contact.fourier import evaluate
 from tirelib.report.simulation import PHI, Simulation, check_range, check_turn_rate, points_of
 
 TURN = PHI[:-1]
@@ -70,7 +70,12 @@ def simulate_file(
     )
     check_range("inflation pressure", p, FIELDS["pressure"].highest, "bar", "pressure")
     check_turn_rate(tire, omega)
-    _check_known(model, warm)
+    wants = [u.effect.name for u in model.used if u.effect.varies_with == ("temperature",)]
+    if wants and not np.isfinite(warm).all():
+        raise ParameterError(
+            f"simulate: the model's {', '.join(wants)} needs the tread temperature, which was not "
+            "given; give --temperature DEGC"
+        )
     values = {**model.values, "damping": tire.damping}
     none, n = np.zeros(target.size), target.size
     points = Operating(
@@ -91,15 +96,6 @@ def simulate_file(
     found = _pressed(model, values, points)
     seen = _of_rolling(found) if isinstance(found, Solution) else _of_linear(found)
     return _simulation(tire, *seen, found.deflection, points)
-
-
-def _check_known(model: TireModel, temperature: FloatArray) -> None:
-    wants = [u.effect.name for u in model.used if u.effect.varies_with == ("temperature",)]
-    if wants and not np.isfinite(temperature).all():
-        raise ParameterError(
-            f"simulate: the model's {', '.join(wants)} needs the tread temperature, which was not "
-            "given; give --temperature DEGC"
-        )
 
 
 def _pressed(
@@ -160,7 +156,9 @@ def _of_linear(state: State) -> tuple[_Curves, FloatArray]:
     assert state.contact is not None  # noqa: S101 - the chain sets it
     assert state.belt is not None  # noqa: S101
     assert state.strain is not None  # noqa: S101
-    u, v, strain = (_on_turn(h) for h in (state.belt[..., 0], state.belt[..., 1], state.strain))
+    u, v, strain = (
+        evaluate(h, TURN) for h in (state.belt[..., 0], state.belt[..., 1], state.strain)
+    )
     pressure = state.contact.pressure_at(TURN)
     up, along = pressure * np.cos(TURN), -pressure * np.sin(TURN)
     return _Curves(u, v, pressure, up, along, strain, state.wave), state.contact.edges
@@ -176,7 +174,8 @@ def _of_rolling(found: Solution) -> tuple[_Curves, FloatArray]:
         u, v, strain = u + added.u - plain.u, v + added.v - plain.v, strain - plain.strain
         strain, edges = strain + added.strain, edges + is_now - was
         pressure = pressure + added.pressure - plain.pressure
-        pressure = np.where(_inside(edges), np.maximum(pressure, 0.0), 0.0)
+        inside = (edges[:, :1] <= TURN) & (edges[:, 1:] >= TURN)
+        pressure = np.where(inside, np.maximum(pressure, 0.0), 0.0)
     return _Curves(u, v, pressure, pressure, turn.shear, strain, found.waveform), edges
 
 
@@ -208,17 +207,6 @@ def _simulation(
         rate,
         gage=gage,
     )
-
-
-def _on_turn(harmonics: ComplexArray) -> FloatArray:
-    """Return Re sum F_n exp(i n phi) over `TURN`."""
-    angle = np.arange(harmonics.shape[-1])[:, None] * TURN
-    out: FloatArray = harmonics.real @ np.cos(angle) - harmonics.imag @ np.sin(angle)
-    return out
-
-
-def _inside(edges: FloatArray) -> FloatArray:
-    return np.asarray((edges[:, :1] <= TURN) & (edges[:, 1:] >= TURN))
 
 
 def _slope(values: FloatArray) -> FloatArray:

@@ -5,10 +5,7 @@ import numpy as np
 from tirelib.core.errors import ConvergenceError, ParameterError
 from tirelib.core.parameters import TireFile
 from tirelib.inference.compare.model import TireModel, UsedEffect
-from tirelib.report.simulation import (
-    Simulation,
-)
-from tirelib.report.simulation import simulate as simulate_tire
+from tirelib.report.simulation import Simulation, simulate
 from tirelib.report.simulation_series import MOST_MODES, bending_length, wanted_modes
 
 LARGEST_DEFLECTION = 0.2
@@ -76,7 +73,7 @@ def _overload(done: Simulation) -> list[str]:
         "tire would hardly carry this load"
     )
     try:
-        bearable = simulate_tire(
+        bearable = simulate(
             tire,
             deflection=largest,
             inflation=done.inflation[point],

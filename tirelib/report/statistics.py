@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 
+from tirelib.core.arrays import r_squared
 from tirelib.estimators.dissertation import Regression
 from tirelib.estimators.polynomial import Polynomial
 from tirelib.estimators.train import Trained
-from tirelib.report.accuracy import FACTOR, TITLE, UNIT
+from tirelib.report.accuracy import SAID
 from tirelib.report.figures.lateral_force import SMALL_ANGLE
-from tirelib.report.figures.regression import in_use, rms
+from tirelib.report.figures.regression import in_use, known_rms
 from tirelib.report.page import DASH, Table, number, p_value
 
 REGRESSOR_UNIT = {
@@ -97,17 +98,19 @@ def in_use_table(trained: Trained) -> Table:
             continue
         measured, error = held[0], held[0] - held[1]
         small = error[np.abs(np.rad2deg(angle)) <= SMALL_ANGLE] if quantity == "alpha" else None
-        spread = float(np.sum((measured - measured.mean()) ** 2))
-        r2 = 1.0 - float(np.sum(error**2)) / spread if spread > 0.0 else float("nan")
-        old = [r.cross_validated for r in trained.regressions if _same(r, quantity)]
+        old = [
+            r.cross_validated
+            for r in trained.regressions
+            if r.quantity == quantity and r.source != "Table 4-2"
+        ]
         rows.append(
             {
-                "quantity": TITLE[quantity],
-                "unit": UNIT[quantity],
-                "held out": number(rms(error)),
-                f"up to {SMALL_ANGLE} deg": DASH if small is None else number(rms(small)),
+                "quantity": SAID[quantity].title,
+                "unit": SAID[quantity].unit,
+                "held out": number(known_rms(error)),
+                f"up to {SMALL_ANGLE} deg": DASH if small is None else number(known_rms(small)),
                 "dissertation, held out": number(min(old)) if old else DASH,
-                "R\u00b2": f"{r2:.5f}",
+                "R\u00b2": f"{r_squared(measured, error):.5f}",
                 "measurements": str(error.size),
                 "terms": str(len(model.terms)),
             }
@@ -121,10 +124,6 @@ def in_use_table(trained: Trained) -> Table:
         "dissertation's column is the best of its own regressions of the quantity, on the same "
         f"data up to {SMALL_ANGLE} deg of slip angle.",
     )
-
-
-def _same(regression: Regression, quantity: str) -> bool:
-    return regression.quantity == quantity and regression.source != "Table 4-2"
 
 
 def estimator_tables(trained: Trained) -> list[Table]:
@@ -144,7 +143,7 @@ def _name(quantity: str) -> tuple[str, str, float]:
     """Return name, unit and factor from SI of what the polynomial of a quantity gives."""
     if quantity == "kappa":
         return "effective rolling radius (for the slip ratio)", "mm", 1e3
-    return TITLE[quantity], UNIT[quantity], FACTOR[quantity]
+    return SAID[quantity].title, SAID[quantity].unit, float(SAID[quantity].told(1.0))
 
 
 def _coefficients(quantity: str, model: Polynomial) -> Table:
@@ -217,7 +216,7 @@ def held_out_table(rows: Sequence[Mapping[str, Any]]) -> Table:
         {
             "held out": lambda row: str(row["held_out"]).replace("_", " "),
             "level": lambda row: str(row["level"]),
-            "quantity": lambda row: TITLE.get(str(row["quantity"]), str(row["quantity"])),
+            "quantity": lambda row: SAID[str(row["quantity"])].title,
             "unit": lambda row: str(row["unit"]),
             "where": lambda row: where[row.get("inside")],
             "runs": lambda row: str(row.get("n", "")),
@@ -238,6 +237,6 @@ def refused_table(trained: Trained) -> Table:
     return Table(
         "Quantities without a calibration",
         ("quantity", "why"),
-        [(TITLE.get(q, q), why) for q, why in trained.links.refused.items()],
+        [(SAID[q].title, why) for q, why in trained.links.refused.items()],
         texts=2,
     )

@@ -123,9 +123,7 @@ def diagonal(axes: Axes, *values: Iterable[float]) -> None:
     axes.plot(ends, ends, color=FAINT, linewidth=1.0, zorder=1.5, label=AGREEMENT)
 
 
-def legend_below(
-    figure: Figure, panels: Sequence[Axes], *, columns: int = 6, title: str | None = None
-) -> None:
+def legend_below(figure: Figure, panels: Sequence[Axes], *, columns: int = 6) -> None:
     """Gather the legend entries of some axes, each once, under the figure."""
     found: dict[str, Artist] = {}
     for axes in panels:
@@ -135,11 +133,7 @@ def legend_below(
         found[AGREEMENT] = found.pop(AGREEMENT)
     for ncols in range(min(columns, max(len(found), 1)), 0, -1):
         legend = figure.legend(
-            list(found.values()),
-            list(found),
-            loc="outside lower center",
-            ncols=ncols,
-            title=title,
+            list(found.values()), list(found), loc="outside lower center", ncols=ncols
         )
         if ncols == 1 or legend.get_window_extent().width < 0.98 * figure.bbox.width:
             return

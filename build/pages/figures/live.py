@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from pages.figures.strain import ANGLE, STRAIN
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.inference.compare.sentences import millimetres
-from tirelib.report.accuracy import QUANTITIES, SIGNED, TITLE, UNIT, WIDTH
+from tirelib.report.accuracy import QUANTITIES, SAID, WIDTH
 from tirelib.report.style import (
     BLACK,
     BLUE,
@@ -128,13 +128,13 @@ def _draw_quantity(left: Axes, right: Axes, strip: Strip, name: str) -> None:
                 zorder=1.2,
             )
     zero_line(right)
-    left.set_ylabel(_label(TITLE[name], name))
+    left.set_ylabel(_label(SAID[name].title, name))
     right.set_ylabel(_label("difference", name))
 
 
 def _label(text: str, name: str) -> str:
     """Return a label in two lines, for the rows are low."""
-    return label(text, UNIT[name], signed=name in SIGNED).replace(" [", "\n[", 1)
+    return label(text, SAID[name].unit, signed=SAID[name].signed).replace(" [", "\n[", 1)
 
 
 def _stretches(strip: Strip, name: str) -> Iterator[slice]:

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from tirelib.report.error_sentences import error_line, held_out_line, unmoved
-from tirelib.report.explanation import STANDS_OUT, explained, mark_of
+from tirelib.report.explanation import STANDS_OUT, explained, mark_of, titled
 
 
 def candidate(effect: str, **changes: Any) -> dict[str, Any]:
@@ -103,7 +103,7 @@ def test_what_is_named_is_added_by_a_command_that_can_be_pasted() -> None:
     assert told.next.startswith("Add it: tirelib add damping --model M.toml --data DIR --out M2")
     spaced = explained(diagnosis(), "my M.toml", "a b", ["own law.py"])
     assert "--model 'my M.toml' --data 'a b' --effects 'own law.py' --out M2" in spaced.next
-    assert [title for title, _ in told.lines] == [
+    assert [title for title, _ in titled(told._asdict())] == [
         "What is missing",
         "How sure",
         "The error",
@@ -195,7 +195,7 @@ def test_every_verdict_has_its_words(changes: dict[str, Any], missing: str, sure
     told = explained(diagnosis(**changes))
     assert missing in told.missing
     assert sure in told.sure
-    for _, said in told.lines:
+    for said in told:
         assert said[0].isupper() or said.startswith("damping")
         assert said.endswith(".")
 

@@ -9,8 +9,9 @@ import pytest
 from pages.cutoff_study import nearest_runs, study_cut_off
 
 from tests.unit.report.conftest import World
+from tirelib.estimators.result import TRUTH
 from tirelib.measured.signal.lowpass import DEFAULT_ORDER
-from tirelib.report.accuracy import TRUTH, WIDTH, Compared, accuracies, accuracy, compare
+from tirelib.report.accuracy import WIDTH, Compared, accuracies, accuracy, compare
 from tirelib.report.levels import camber_levels, find_levels, load_levels, reference_level, upright
 
 
@@ -80,7 +81,7 @@ def test_levels_part_at_gaps_and_hold_every_known_value() -> None:
     assert [level.text for level in levels] == ["1200 N", "3000 N", "4800 N"]
     assert (sum(level.rows for level in levels) == np.isfinite(values)).all()
     assert reference_level(levels).text == "3000 N"
-    assert find_levels(np.array([np.nan]), 1.0, "{}") == []
+    assert find_levels(np.array([np.nan]), 1.0, str) == []
     assert [x.text for x in camber_levels(np.array([-4.0, 0.0, 4.01]))] == [
         "camber -4 deg",
         "camber 0 deg",

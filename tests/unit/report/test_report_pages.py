@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tests.unit.report.conftest import World
-from tirelib.report.calibration import write_calibration_report, write_estimate_report
+from tirelib.report.calibration import write_calibration_report
+from tirelib.report.estimate import write_estimate_report
 from tirelib.report.page import number
 from tirelib.report.statistics import in_use_table, regression_tables
 

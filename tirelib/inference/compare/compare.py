@@ -11,7 +11,7 @@ from tirelib.inference.compare.forces import ForceComparison, compare_forces
 from tirelib.inference.compare.model import model_of
 from tirelib.inference.compare.strain import Comparison, compare_strain
 from tirelib.inference.identify.force_data import FORCES
-from tirelib.measured.waveforms import Waveforms, measure_waveforms
+from tirelib.measured.waveforms import measure_waveforms
 
 QUANTITIES = ("strain", *FORCES)
 BRUSH = ("bristle_lateral", "bristle_longitudinal", "friction")
@@ -25,7 +25,6 @@ def compare(
     quantity: str | None = None,
     *,
     effects: Mapping[str, Effect] = CATALOGUE,
-    waves: Waveforms | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Comparison | ForceComparison:
     """Hold a model against one quantity of a campaign.
@@ -40,8 +39,6 @@ def compare(
         largest lack of fit.
     effects : mapping
         By name, as the model's file names them.
-    waves : Waveforms, optional
-        Waveforms of the campaign, when they have been read already.
     progress : callable, optional
         Called with a label after each run.
 
@@ -62,7 +59,7 @@ def compare(
         )
     if quantity == "strain" or (quantity is None and has_strain):
         needs_ring(campaign, file)
-        waves = waves or measure_waveforms(campaign, progress=progress)
+        waves = measure_waveforms(campaign, progress=progress)
         return compare_strain(waves, model_of(file, effects), campaign.content_hash())
     return compare_forces(campaign, file, quantity, effects)
 

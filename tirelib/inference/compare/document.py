@@ -6,12 +6,11 @@ import numpy as np
 
 from tirelib.core.quantities import QUANTITIES
 from tirelib.inference.compare.force_curves import Curve, curves_of, ranked
-from tirelib.inference.compare.forces import UNITS, ForceCell, ForceComparison
+from tirelib.inference.compare.forces import ForceCell, ForceComparison
 from tirelib.inference.compare.gages import Gage
 from tirelib.inference.compare.regions import Region
 from tirelib.inference.compare.sectors import Cell
 from tirelib.inference.compare.sentences import place
-from tirelib.inference.compare.set_points import NAMES
 from tirelib.inference.compare.strain import Comparison
 from tirelib.inference.compare.tracks import Track, track_fit
 
@@ -20,46 +19,57 @@ FORMAT = "tirelib-comparison/1"
 
 def comparison_document(found: Comparison | ForceComparison) -> dict[str, Any]:
     """Return a comparison's numbers; keys are the same for strain and forces."""
-    return _forces(found) if isinstance(found, ForceComparison) else _strain(found)
+    own = _forces(found) if isinstance(found, ForceComparison) else _strain(found)
+    return {
+        "format": FORMAT,
+        "effects": [{"effect": u.effect.name, "strength": u.strength} for u in found.used],
+        "axes": "iso",
+        "quantity": found.quantity,
+        "verdict": found.verdict,
+        **found.told,
+        "p": found.p,
+        "smooth_floor": None,
+        "smooth_share": None,
+        "statements": list(found.sentences),
+        "messages": list(found.messages),
+        **{name: [] for name in ("regions", "set_points", "tracks", "gages", "curves", "runs")},
+        "sources": [
+            {"what": u.effect.name, "title": u.effect.title, "source": u.effect.source}
+            for u in found.used
+        ],
+        **own,
+        "floor_source": "history" if np.isfinite(own["floor"]) else None,
+    }
 
 
 def _strain(found: Comparison) -> dict[str, Any]:
-    fit, noise, floor = found.fit, found.noise, found.floor
-    runs = found.chosen.straight
-    errors = dict(zip(np.flatnonzero(runs).tolist(), found.error.by_run.tolist(), strict=True))
+    noise, floor, counted = found.noise, found.floor, found.chosen.straight
+    errors = dict(zip(np.flatnonzero(counted).tolist(), found.error.by_run.tolist(), strict=True))
     return {
-        "format": FORMAT,
         "campaign": found.chosen.waves.header.name,
         "model": found.model.name,
-        "effects": [{"effect": u.effect.name, "strength": u.strength} for u in found.model.used],
-        "axes": "iso",
-        "quantity": "strain",
         "unit": "ustrain",
-        "verdict": fit.verdict,
-        **found.error.told,
-        "p": fit.p,
         "repeats": noise.repeats,
-        "residual_rms": 1e6 * fit.rms,
-        "residual_rms_noise": fit.rms / noise.std,
-        "measured_rms": 1e6 * fit.strain_rms,
+        "residual_rms": 1e6 * found.rms,
+        "residual_rms_noise": found.rms / noise.std,
+        "measured_rms": 1e6 * found.measured_rms,
         "delay_us": 1e6 * found.error.delay,
         "delay_std_us": 1e6 * found.error.delay_std,
         "floor": floor.value,
-        "floor_source": "history" if np.isfinite(floor.value) else None,
         "smooth_floor": floor.smooth,
         "smooth_share": floor.share,
-        "statements": list(found.sentences),
         "regions": [_region(region, found) for region in found.regions],
-        "messages": list(found.messages),
         "table": [_cell(cell, noise.std) for cell in found.table],
-        "set_points": _set_points(found),
+        "set_points": [
+            row | {"largest_in_tolerances": abs(row["largest_in_tolerances"])}
+            for row in found.points.told(found.run)
+        ],
         "tracks": [_track(track, found) for track in found.tracks],
         "gages": [_gage(gage, found) for gage in found.gages],
-        "curves": [],
         "runs": [
             {
                 "run": int(found.run[i]),
-                "counted": bool(runs[i]),
+                "counted": bool(counted[i]),
                 "rms": 1e6 * float(found.run_rms[i]),
                 "rms_noise": float(found.run_rms[i]) / noise.std,
                 "error": errors.get(i),
@@ -67,14 +77,24 @@ def _strain(found: Comparison) -> dict[str, Any]:
             }
             for i in range(len(found.run))
         ],
-        "ranked": dict(
-            zip(
-                ("best", "median", "worst"),
-                (int(found.run[i]) for i in found.ranked()),
-                strict=True,
-            )
-        ),
-        "sources": _sources(found),
+        "ranked": {name: int(found.run[i]) for name, i in found.ranked().items()},
+    }
+
+
+def _forces(found: ForceComparison) -> dict[str, Any]:
+    curves = curves_of(found)
+    return {
+        "campaign": found.name,
+        "model": found.model,
+        "unit": found.unit,
+        "repeats": found.repeats,
+        "residual_rms": found.rms,
+        "residual_rms_noise": found.rms / found.noise,
+        "measured_rms": found.measured_rms,
+        "floor": found.floor,
+        "table": [_force_cell(cell, found.noise) for cell in found.table],
+        "curves": [_curve(curve, found) for curve in curves],
+        "ranked": {name: curve.words for name, curve in ranked(curves).items()} or None,
     }
 
 
@@ -101,11 +121,18 @@ def _cell(cell: Cell, noise: float) -> dict[str, Any]:
     }
 
 
-def _region(region: Region, found: Comparison) -> dict[str, Any]:
+def _where(region: Region, found: Comparison) -> dict[str, Any]:
     return {
         "sector": place(region, found.prediction.edges),
         "from_rad": region.start,
         "to_rad": region.stop,
+        "p": region.p,
+    }
+
+
+def _region(region: Region, found: Comparison) -> dict[str, Any]:
+    return {
+        **_where(region, found),
         "by": region.by,
         "side": region.side or None,
         "value": edge_value(region.by, region.value),
@@ -113,26 +140,8 @@ def _region(region: Region, found: Comparison) -> dict[str, Any]:
         "runs": region.runs,
         "mean": 1e6 * region.mean,
         "mean_std": 1e6 * region.std,
-        "p": region.p,
         "share": region.share,
     }
-
-
-def _set_points(found: Comparison) -> list[dict[str, Any]]:
-    scaled = found.points.scaled
-    units = ("%", "%", "%", "mrad")
-    factor = (100.0, 100.0, 100.0, 1e3)
-    return [
-        {
-            "name": name,
-            "unit": units[k],
-            "tolerance": factor[k] * float(np.median(found.points.tolerance[:, k])),
-            "rms_in_tolerances": float(np.sqrt(np.mean(scaled[:, k] ** 2))),
-            "largest_in_tolerances": float(np.abs(scaled[:, k]).max()),
-            "largest_run": int(found.run[np.argmax(np.abs(scaled[:, k]))]),
-        }
-        for k, name in enumerate(NAMES)
-    ]
 
 
 def _track(track: Track, found: Comparison) -> dict[str, Any]:
@@ -162,63 +171,13 @@ def _gage(gage: Gage, found: Comparison) -> dict[str, Any]:
         "rms": 1e6 * gage.rms,
         "rms_noise": gage.rms / gage.noise.std,
         "sectors": [_cell(cell, gage.noise.std) for cell in gage.table],
-        "departure": None
-        if departure is None
-        else {
-            "sector": place(departure.region, found.prediction.edges),
-            "from_rad": departure.region.start,
-            "to_rad": departure.region.stop,
+        "departure": departure
+        and {
+            **_where(departure.region, found),
             "mean": 1e6 * departure.mean,
             "mean_std": 1e6 * departure.std,
             "mean_of_all_gages": 1e6 * departure.of_all,
-            "p": departure.region.p,
         },
-    }
-
-
-def _sources(found: Comparison) -> list[dict[str, str]]:
-    return [
-        {"what": used.effect.name, "title": used.effect.title, "source": used.effect.source}
-        for used in found.model.used
-    ]
-
-
-def _forces(found: ForceComparison) -> dict[str, Any]:
-    curves = curves_of(found)
-    named = ranked(curves)
-    return {
-        "format": FORMAT,
-        "campaign": found.name,
-        "model": found.model,
-        "effects": [{"effect": u.effect.name, "strength": u.strength} for u in found.used],
-        "axes": "iso",
-        "quantity": found.quantity,
-        "unit": UNITS[found.quantity],
-        "verdict": found.verdict,
-        **found.told,
-        "p": found.p,
-        "repeats": found.repeats,
-        "residual_rms": found.rms,
-        "residual_rms_noise": found.rms / found.noise,
-        "measured_rms": found.measured_rms,
-        "floor": found.floor,
-        "floor_source": "history" if np.isfinite(found.floor) else None,
-        "smooth_floor": None,
-        "smooth_share": None,
-        "statements": list(found.sentences),
-        "regions": [],
-        "messages": list(found.messages),
-        "table": [_force_cell(cell, found.noise) for cell in found.table],
-        "set_points": [],
-        "tracks": [],
-        "gages": [],
-        "curves": [_curve(curve, found) for curve in curves],
-        "runs": [],
-        "ranked": {name: curve.words for name, curve in named.items()} or None,
-        "sources": [
-            {"what": used.effect.name, "title": used.effect.title, "source": used.effect.source}
-            for used in found.used
-        ],
     }
 
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from scipy import linalg
 
-from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray, rms
 from tirelib.effects.state import Operating
 from tirelib.inference.compare.model import Prediction, TireModel, predict_runs
 from tirelib.inference.compare.set_points import predict_set_points, tangents
@@ -177,12 +177,12 @@ class Yardstick:
             delay, deviation = self._delay(raw, prediction)
         late = late_prediction(prediction, self.at.omega, delay)
         rest, whiten = self.strain - late.strain, None
-        value = 1e6 * _rms(rest)
+        value = 1e6 * rms(rest)
         if np.isfinite(self.noise):
             whiten = whitening_of(tangents(late), self.scale, self.noise)
-            value = _rms(whiten(rest))
+            value = rms(whiten(rest))
         return ModelError(
-            value, self.unit, self.noise, _rms(rest), delay, deviation, late, rest, whiten
+            value, self.unit, self.noise, rms(rest), delay, deviation, late, rest, whiten
         )
 
     def _delay(self, raw: FloatArray, prediction: Prediction) -> tuple[float, float]:
@@ -192,7 +192,7 @@ class Yardstick:
         """
         tangent = tangents(prediction)
         first = predict_set_points(raw, tangent, self.scale, self.noise)
-        whiten = whitening_of(tangent, self.scale, max(_rms(raw - first.shift), LEAST_NOISE))
+        whiten = whitening_of(tangent, self.scale, max(rms(raw - first.shift), LEAST_NOISE))
         return fitted_delay(
             self.strain, prediction.strain, self.at.omega, whiten, first.independent
         )
@@ -220,10 +220,6 @@ def named_errors(before: ModelError, after: ModelError) -> Mapping[str, Any]:
         "residual_rms_after": 1e6 * after.rms,
         "residual_rms_unit": MICROSTRAIN,
     }
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def fitted_delay(
@@ -357,4 +353,4 @@ def _without_smooth(
     normal = rows @ rows.T + np.eye(len(rows))
     weights = linalg.cho_solve(linalg.cho_factor(normal), rows @ white)
     left = white - weights @ rows
-    return float(np.sqrt(np.mean(left**2)))
+    return rms(left)

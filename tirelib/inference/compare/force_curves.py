@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray, rms
+from tirelib.inference.compare.force_model import slip_of
 from tirelib.inference.compare.forces import ForceComparison
 from tirelib.inference.compare.sentences import told
 from tirelib.inference.identify.error_bands import levels
@@ -40,11 +41,6 @@ class Curve:
     def points(self) -> int:
         """How many points it has."""
         return int(self.member.size)
-
-
-def slip_of(quantity: str) -> str:
-    """Return the slip that a force comes from."""
-    return "slip_ratio" if quantity == "Fx" else "slip_angle"
 
 
 def set_point_levels(data: ForceData) -> dict[str, IntArray]:
@@ -88,8 +84,8 @@ def curves_of(found: ForceComparison) -> tuple[Curve, ...]:
             words += f", {told('pressure', 5e3 * round(pressure / 5e3))}"
         if several[2]:
             words += f", camber {told('camber', angle)}"
-        rms = float(np.sqrt(np.mean(found.difference[member] ** 2)))
-        out.append(Curve(load, pressure, angle, member, rms, words))
+        left = rms(found.difference[member])
+        out.append(Curve(load, pressure, angle, member, left, words))
     return tuple(sorted(out, key=lambda curve: curve.rms))
 
 

@@ -163,8 +163,12 @@ def strain_effects(file: TireFile, model: ForceModel) -> list[str]:
     return [name for name in named if name not in mine]
 
 
+def slip_of(quantity: str) -> str:
+    """Return the slip that a force comes from."""
+    return "slip_ratio" if quantity == "Fx" else "slip_angle"
+
+
 def slips(data: ForceData, name: str) -> bool:
     """Whether the slip that a force comes from varies."""
-    if name == "Fx":
-        return bool(np.ptp(data.slip_ratio) >= RATIO_SPAN)
-    return bool(np.ptp(data.slip_angle) >= ANGLE_SPAN)
+    span = RATIO_SPAN if name == "Fx" else ANGLE_SPAN
+    return bool(np.ptp(getattr(data, slip_of(name))) >= span)

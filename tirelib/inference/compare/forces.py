@@ -14,7 +14,7 @@ import numpy as np
 from scipy import special
 
 from tirelib.campaign import Campaign
-from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray, rms
 from tirelib.core.parameters import TireFile
 from tirelib.core.quantities import QUANTITIES
 from tirelib.effects import CATALOGUE, Effect
@@ -23,6 +23,7 @@ from tirelib.inference.compare.force_model import (
     ForceModel,
     force_model_of,
     quantities_of,
+    slip_of,
     slips,
     strain_effects,
     usable_points,
@@ -139,16 +140,16 @@ class ForceComparison:
     floor: float = float("nan")
 
     @property
-    def error_unit(self) -> str:
-        """Unit of the error: noise, N or Nm."""
-        return "noise" if np.isfinite(self.noise) else UNITS[self.quantity]
+    def unit(self) -> str:
+        """Unit of the force: N or Nm."""
+        return QUANTITIES[self.quantity].unit
 
     @property
     def told(self) -> dict[str, Any]:
         """The keys under which every document states an error: value, unit, noise, raw rms."""
         return {
             "error": self.error,
-            "error_unit": self.error_unit,
+            "error_unit": "noise" if np.isfinite(self.noise) else self.unit,
             "noise": self.noise,
             "residual_rms_raw": self.rms,
         }
@@ -192,12 +193,8 @@ def compare_forces(
     every = [
         _compare(campaign, model, points, getattr(found, name), name, data_hash) for name in wanted
     ]
-    best = max(every, key=_lack)
+    best = max(every, key=lambda c: c.error if np.isfinite(c.noise) else c.rms / c.measured_rms)
     return replace(best, messages=(*best.messages, *left_out))
-
-
-def _lack(found: ForceComparison) -> float:
-    return found.error if np.isfinite(found.noise) else found.rms / found.measured_rms
 
 
 def _compare(
@@ -215,13 +212,12 @@ def _compare(
     measured = getattr(data, name)
     difference = predicted - measured
     noise, freedom, repeats = force_noise(points, measured)
-    rms = float(np.sqrt(np.mean(difference**2)))
-    size = float(np.sqrt(np.mean(measured**2)))
-    error, p = rms, float("nan")
+    left, size = rms(difference), rms(measured)
+    error, p = left, float("nan")
     if freedom:
-        error = rms / noise
+        error = left / noise
         p = float(special.fdtrc(difference.size, freedom, error**2))
-    verdict = verdict_of(rms / size, p)
+    verdict = verdict_of(left / size, p)
     table = _table(data, difference, measured, noise)
     said = _sentences(name, table, freedom) if verdict == "lack_of_fit" else ()
     return ForceComparison(
@@ -235,14 +231,14 @@ def _compare(
         noise,
         repeats,
         error,
-        rms,
+        left,
         size,
         p,
         verdict,
         table,
         said,
         (
-            *_messages(campaign, name, points, verdict, rms / size, repeats),
+            *_messages(campaign, name, points, verdict, left / size, repeats),
             *noise_note(name, noise, size),
             *taken_as_zero(campaign),
         ),
@@ -286,7 +282,7 @@ def _table(
                     low,
                     high,
                     n,
-                    float(np.sqrt(np.mean(d**2))),
+                    rms(d),
                     float(d.mean()),
                     float(excess[member].mean()),
                     noise / np.sqrt(n),
@@ -318,11 +314,12 @@ def _sentences(name: str, table: Sequence[ForceCell], freedom: int) -> tuple[str
 def _say(name: str, cell: ForceCell) -> str:
     if cell.is_shifted:
         return (
-            f"At camber {range_of(cell)} the model's {name} is shifted by {_signed(cell.shift)} "
+            f"At camber {range_of(cell)} the model's {name} is shifted by "
+            f"{'-' if cell.shift < 0.0 else '+'}{_short(abs(cell.shift))} "
             f"± {_short(1.96 * cell.excess_std)} {UNITS[name]} where camber is "
             f"positive, and the other way where it is negative (95 %, {cell.points} points)."
         )
-    kind = {"slip_angle": "slip angle", "slip_ratio": "slip ratio"}.get(cell.by, cell.by)
+    kind = cell.by.replace("_", " ")
     size = "large" if cell.excess > 0.0 else "small"
     sign = ", either sign, " if cell.by in SLIP_LIMITS else ", "
     return (
@@ -344,10 +341,6 @@ def range_of(cell: ForceCell) -> str:
         grain = 1.0
     low, high = (told(cell.by, grain * round(value / grain)) for value in (cell.low, cell.high))
     return low if low == high else f"{low} to {high}"
-
-
-def _signed(value: float) -> str:
-    return f"{'-' if value < 0.0 else '+'}{_short(abs(value))}"
 
 
 def _short(value: float) -> str:
@@ -377,7 +370,7 @@ def _messages(
             "once; the noise is that of a pass's mean."
         )
     if not slips(points.data, name):
-        slip = "slip ratio" if name == "Fx" else "slip angle"
+        slip = slip_of(name).replace("_", " ")
         out.append(
             f"{where} holds one {slip} only: {name} says nothing about the brush. "
             "Add runs with slip."

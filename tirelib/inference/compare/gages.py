@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray, rms
 from tirelib.inference.compare.regions import LEVEL, Region, find_regions
 from tirelib.inference.compare.runs import Chosen
 from tirelib.inference.compare.sectors import Cell, cells, weighted_variance
@@ -102,7 +102,7 @@ def compare_gages(
                 number,
                 chosen.waves.header.gage_lateral[number],
                 noise,
-                float(np.sqrt(np.mean(part[counted] ** 2))),
+                rms(part[counted]),
                 cells(part, sector, counted, (), noise, points),
                 departure,
             )

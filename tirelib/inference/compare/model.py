@@ -10,7 +10,7 @@ from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError, FormatError, ParameterError, TirelibError
 from tirelib.core.parameters import TireFile
 from tirelib.effects import CATALOGUE, Effect
-from tirelib.effects.state import Operating, State
+from tirelib.effects.state import Operating
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import N_PHI
 from tirelib.model.base import predict, values_of
@@ -212,34 +212,24 @@ def predict_runs(
     CalibrationError
         If the model cannot be computed there; with the model's own message.
     """
+    places = np.asarray(lateral, dtype=float)
+    one = _rolling if model.large else _linear
+    found: list[Prediction] = []
     try:
-        places = np.asarray(lateral, dtype=float)
-        return _predict_runs(model, points, places, low_pass, start)
+        for place in places if model.across else np.zeros(1):
+            at: Changes = [("constants", _at(place))] if model.across else []
+            changes = [*at, *model.changes]
+            found.append(one(model.values, points, changes, low_pass, start))
     except TirelibError as error:
         raise CalibrationError(
             f"model {model.name}: it has no solution at the campaign's conditions ({error}); "
             "identify it from this campaign, or correct its numbers"
         ) from error
-
-
-def _predict_runs(
-    model: TireModel,
-    points: Operating,
-    lateral: FloatArray,
-    low_pass: LowPass,
-    start: Start | None,
-) -> Prediction:
-    places = lateral if model.across else np.zeros(1)
-    one = _rolling if model.large else _linear
-    found: list[Prediction] = []
-    for place in places:
-        changes = [("constants", _at(place)), *model.changes] if model.across else model.changes
-        found.append(one(model.values, points, changes, low_pass, start))
     gages = np.concatenate([each.gages for each in found], axis=1)
     return replace(
         found[0],
         strain=np.mean([each.strain for each in found], axis=0),
-        gages=np.broadcast_to(gages, (len(points), lateral.size, N_PHI)),
+        gages=np.broadcast_to(gages, (len(points), places.size, N_PHI)),
         by_load=np.mean([each.by_load for each in found], axis=0),
         by_pressure=np.mean([each.by_pressure for each in found], axis=0),
     )
@@ -247,11 +237,7 @@ def _predict_runs(
 
 def _at(lateral: float) -> Change:
     """Return the change that puts the gage at a lateral position [m]."""
-
-    def change(state: State) -> State:
-        return state.but(lateral=lateral)
-
-    return change
+    return lambda state: state.but(lateral=lateral)
 
 
 def _rolling(

@@ -228,17 +228,19 @@ def _solved(
     values, free = model.values, coordinates(model.values)
     if not model.large:
         linear = linearised(values, at, free, model.changes, low_pass=low_pass)
-
-        def of_linear(changes: Changes) -> FloatArray:
-            return predict(values, at, changes, low_pass=low_pass).wave
-
-        return linear.waveform, linear.waveform_slopes, of_linear
+        return (
+            linear.waveform,
+            linear.waveform_slopes,
+            lambda changes: predict(values, at, changes, low_pass=low_pass).wave,
+        )
     found = solved(values, at, model.changes, low_pass=low_pass)
-
-    def of_rolling(changes: Changes) -> FloatArray:
-        return solved(values, at, changes, low_pass=low_pass, start=found.rolling).waveform
-
-    return found.waveform, by_values(found, free).waveform[: len(free)], of_rolling
+    return (
+        found.waveform,
+        by_values(found, free).waveform[: len(free)],
+        lambda changes: (
+            solved(values, at, changes, low_pass=low_pass, start=found.rolling).waveform
+        ),
+    )
 
 
 def _points(data: ForceData, quantity: str) -> dict[str, Any]:

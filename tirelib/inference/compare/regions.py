@@ -141,7 +141,7 @@ def find_regions(
     t = np.abs(of_group) / std
     p = np.minimum(2.0 * special.stdtr(noise.local_freedom, -t) * t.size, 1.0)
     samples = (weights > 0).sum(axis=1)[None, :] * count
-    total = float(np.sum(difference[_any(groups)] ** 2))
+    total = float(np.sum(difference[members.any(axis=0)] ** 2))
     share = of_group**2 * samples / max(total, 1e-300)
     good = (p < LEVEL) & (share >= LEAST_SHARE)
     out: list[Region] = []
@@ -152,7 +152,12 @@ def find_regions(
             break
         group = groups[int(g)]
         start, stop = float(starts[k]), float(stops[k])
-        if any(_overlap(start, stop, group.member, other) for other in out):
+        if any(
+            start < other.stop - 1e-9
+            and stop > other.start + 1e-9
+            and (group.member & other.member).any()
+            for other in out
+        ):
             continue
         out.append(
             Region(
@@ -171,15 +176,6 @@ def find_regions(
             )
         )
     return tuple(out)
-
-
-def _any(groups: Sequence[_Subset]) -> BoolArray:
-    return np.asarray(np.any([group.member for group in groups], axis=0))
-
-
-def _overlap(start: float, stop: float, member: BoolArray, other: Region) -> bool:
-    apart = stop <= other.start + 1e-9 or start >= other.stop - 1e-9
-    return not apart and bool((member & other.member).any())
 
 
 def _intervals() -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -22,26 +22,19 @@ BOUNDS = (0.7, 1.3, 3.0)
 """Ends of contact, edge and flank, in half contact angles."""
 
 
-def sectors_of(edges: FloatArray, phi: FloatArray = GRID) -> IntArray:
-    """Return the sector of every angle as its number in `SECTORS`, shape (n_runs, n_phi).
+def sectors_of(edges: FloatArray) -> IntArray:
+    """Return the sector of every angle of `GRID` as its number in `SECTORS`, (n_runs, n_phi).
 
     Parameters
     ----------
     edges : shape (n_runs, 2), [rad]
         Entry < 0 < exit.
-    phi : shape (n_phi,), [rad]
     """
-    return sector_at(relative(edges, phi))
-
-
-def relative(edges: FloatArray, phi: FloatArray = GRID) -> FloatArray:
-    """Return angles in units of the half contact on their side, shape (n_runs, n_phi)."""
-    side = np.where(phi[None, :] < 0.0, -edges[:, :1], edges[:, 1:])
-    return np.asarray(phi[None, :] / side)
+    return sector_at(GRID / np.where(GRID < 0.0, -edges[:, :1], edges[:, 1:]))
 
 
 def sector_at(x: FloatArray) -> IntArray:
-    """Return the number in `SECTORS` of relative angles."""
+    """Return the number in `SECTORS` of angles in units of the half contact on their side."""
     size = np.abs(x)
     exit_side = (x > 0.0).astype(np.int64)
     inner, edge, flank = BOUNDS

@@ -1,12 +1,10 @@
 """Lack of fit in plain words."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.quantities import QUANTITIES
-from tirelib.inference.compare.regions import Region
+from tirelib.inference.compare.regions import SLIPS, Region
 from tirelib.inference.compare.sectors import SECTORS, sector_at
 
 PLACES = {
@@ -91,24 +89,19 @@ def conditions(by: str, side: str, value: float) -> str:
     """
     if by == "all":
         return ""
-    names = {"slip_angle": "slip angle ", "camber": "camber ", "slip_ratio": "slip ratio "}
-    end = "and above" if side == "above" else "and below"
-    return f"at {names.get(by, '')}{told(by, value)} {end}"
+    name = f"{by.replace('_', ' ')} " if by in SLIPS else ""
+    return f"at {name}{told(by, value)} and {side}"
 
 
 def sentence(region: Region, edges: FloatArray) -> str:
     """Say one region in plain words."""
-    text = f"{extent(region, edges)}, from {region.start:.2f} to {region.stop:.2f} rad, "
-    limit = conditions(region.by, region.side, region.value)
-    text += f"{limit}, " if limit else "in all runs, "
-    text += f"the model shows {amount(region.mean, region.measured)}"
-    text += f" (95 % \N{PLUS-MINUS SIGN} {small(1.96e6 * region.std)}, {region.runs} runs)."
+    text = (
+        f"{extent(region, edges)}, from {region.start:.2f} to {region.stop:.2f} rad, "
+        f"{conditions(region.by, region.side, region.value) or 'in all runs'}, "
+        f"the model shows {amount(region.mean, region.measured)} (95 % \N{PLUS-MINUS SIGN} "
+        f"{small(1.96e6 * region.std)}, {region.runs} runs)."
+    )
     return text[0].upper() + text[1:]
-
-
-def sentences(regions: Sequence[Region], edges: FloatArray) -> tuple[str, ...]:
-    """Say all regions."""
-    return tuple(sentence(region, edges) for region in regions)
 
 
 def small(value: float) -> str:

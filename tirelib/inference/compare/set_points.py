@@ -13,15 +13,23 @@ turn of n, from the spectrum of what is left.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
-from tirelib.core.arrays import FloatArray
+from tirelib.core.arrays import FloatArray, IntArray, rms
 from tirelib.inference.compare.model import Prediction
 from tirelib.inference.identify import random_effects
 from tirelib.inference.identify.noise import LEAST_NOISE, independent
 
-NAMES = ("load", "pressure", "gain", "angle")
+SAID = {
+    "load": ("load", "%", 100.0),
+    "pressure": ("pressure", "%", 100.0),
+    "gain": ("gain", "%", 100.0),
+    "angle": ("angle zero", "mrad", 1e3),
+}
+"""What is predicted of each run: in words, its unit, and the factor to it from a ratio or [rad]."""
 ROUNDS = 60
 SETTLED = 0.02
 """Relative change of V from which the set points no longer move by what can be seen."""
@@ -58,6 +66,21 @@ class SetPoints:
     shift: FloatArray
     spread: FloatArray
     independent: float
+
+    def told(self, run: IntArray) -> list[dict[str, Any]]:
+        """Return a row for each set point; the largest has its sign."""
+        worst = np.argmax(np.abs(self.scaled), axis=0)
+        return [
+            {
+                "name": name,
+                "unit": unit,
+                "tolerance": factor * float(np.median(self.tolerance[:, k])),
+                "rms_in_tolerances": rms(self.scaled[:, k]),
+                "largest_in_tolerances": float(self.scaled[worst[k], k]),
+                "largest_run": int(run[worst[k]]),
+            }
+            for k, (name, (_, unit, factor)) in enumerate(SAID.items())
+        ]
 
     @property
     def scaled(self) -> FloatArray:
@@ -100,15 +123,11 @@ def predict_set_points(
         shift = (tangent @ value)[:, :, 0]
         left = rest - shift
         unknown = np.einsum("rnk,rnk->n", tangent @ covariance, tangent) / len(rest)
-        new = np.maximum(_averaged(np.mean(left**2, axis=0) + unknown), least**2)
+        new = np.maximum(
+            uniform_filter1d(np.mean(left**2, axis=0) + unknown, WINDOW, mode="wrap"), least**2
+        )
         change = float(np.max(np.abs(np.log(new / variance))))
         variance = new
         if change < SETTLED:
             break
     return SetPoints(value[:, :4, 0], scale, covariance, tangent, shift, np.sqrt(variance), count)
-
-
-def _averaged(values: FloatArray) -> FloatArray:
-    """Return the running mean around the turn."""
-    padded = np.pad(values, WINDOW // 2, mode="wrap")
-    return np.convolve(padded, np.full(WINDOW, 1.0 / WINDOW), mode="valid")

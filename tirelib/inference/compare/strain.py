@@ -1,11 +1,13 @@
 """A model held against the strain waveforms of a campaign."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import special
 
-from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray, rms
 from tirelib.inference.compare.error import (
     Floor,
     ModelError,
@@ -15,12 +17,12 @@ from tirelib.inference.compare.error import (
     late_prediction,
 )
 from tirelib.inference.compare.gages import Gage, compare_gages, gage_sentences
-from tirelib.inference.compare.model import Prediction, TireModel, predict_runs
+from tirelib.inference.compare.model import Prediction, TireModel, UsedEffect, predict_runs
 from tirelib.inference.compare.regions import SLIPS, Region, find_regions
 from tirelib.inference.compare.runs import Chosen, choose
 from tirelib.inference.compare.sectors import Cell, cells, sectors_of
-from tirelib.inference.compare.sentences import sentences
-from tirelib.inference.compare.set_points import NAMES, SetPoints, predict_set_points, tangents
+from tirelib.inference.compare.sentences import sentence
+from tirelib.inference.compare.set_points import SAID, SetPoints, predict_set_points, tangents
 from tirelib.inference.compare.tracks import Track, track_sentences, tracks
 from tirelib.inference.identify.campaign_data import straight_noise
 from tirelib.inference.identify.noise import RepeatNoise
@@ -33,31 +35,6 @@ NO_FIT = 0.5
 SIGNIFICANT = 0.01
 BEYOND = 2.0
 """Rms of the predicted set points, in tolerances, from which they are misfit and not chance."""
-
-
-@dataclass(frozen=True, slots=True)
-class Fit:
-    """The residual against the noise of the repeats.
-
-    Attributes
-    ----------
-    verdict : str
-        One of `VERDICTS`.
-    rms : float, [-]
-        Rms of model less measured, set points and delay taken out.
-    strain_rms : float, [-]
-        Rms of the measurement.
-    p : float
-        Chance of such an error if only noise and set points differ (F test); NaN without repeats.
-    beyond : tuple of str
-        Set points that would have to be off by more than `BEYOND` tolerances (rms).
-    """
-
-    verdict: str
-    rms: float
-    strain_rms: float
-    p: float
-    beyond: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +57,15 @@ class Comparison:
         Number in `SECTORS`.
     run_rms : shape (n_runs,), [-]
         Rms of `difference`.
-    fit : Fit
-        Over the counted (straight) runs.
+    rms, measured_rms : float, [-]
+        Of model less measured, set points and delay taken out, and of the measurement; like `p`
+        and `verdict` over the counted runs.
+    p : float
+        Chance of such an error if only noise and set points differ (F test); NaN without repeats.
+    verdict : str
+        As of `verdict_of`.
+    beyond : tuple of str
+        Set points that would have to be off by more than `BEYOND` tolerances (rms).
     sentences : tuple of str
         Lack of fit in plain words: `regions`, set points, `tracks`, `gages`.
     gages : tuple of Gage
@@ -100,7 +84,11 @@ class Comparison:
     by_gage: FloatArray
     sector: IntArray
     run_rms: FloatArray
-    fit: Fit
+    rms: float
+    measured_rms: float
+    p: float
+    verdict: str
+    beyond: tuple[str, ...]
     floor: Floor
     table: tuple[Cell, ...]
     regions: tuple[Region, ...]
@@ -115,15 +103,26 @@ class Comparison:
         return "strain"
 
     @property
+    def used(self) -> tuple[UsedEffect, ...]:
+        """Effects that the model has."""
+        return self.model.used
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """The keys under which every document states an error."""
+        return self.error.told
+
+    @property
     def run(self) -> IntArray:
         """Run numbers."""
         return self.chosen.waves.run
 
-    def ranked(self) -> tuple[int, int, int]:
-        """Return the best, the median and the worst counted run, as indices."""
+    def ranked(self) -> dict[str, int]:
+        """Return the best, the median and the worst counted run, as indices by that name."""
         counted = np.flatnonzero(self.chosen.straight)
         order = counted[np.argsort(self.run_rms[counted], kind="stable")]
-        return int(order[0]), int(order[(order.size - 1) // 2]), int(order[-1])
+        places = {"best": 0, "median": (order.size - 1) // 2, "worst": -1}
+        return {name: int(order[place]) for name, place in places.items()}
 
 
 def compare_strain(waves: Waveforms, model: TireModel, data_hash: str = "") -> Comparison:
@@ -150,15 +149,17 @@ def compare_strain(waves: Waveforms, model: TireModel, data_hash: str = "") -> C
     yardstick = Yardstick(
         chosen.strain, at, scale, repeats.std, tuple(lateral), waves.low_pass
     ).take(counted)
-    error = yardstick.of_prediction(_part(prediction, counted))
+    parts = (getattr(prediction, name)[counted] for name in Prediction.__slots__)
+    error = yardstick.of_prediction(Prediction(*parts))
     prediction = late_prediction(prediction, at.omega, error.delay)
     tangent, rest = tangents(prediction), chosen.strain - prediction.strain
     points = _set_points(rest, tangent, scale, repeats.std, chosen)
     difference = points.shift - rest
-    fit = _fit(error, difference, repeats, points, chosen)
+    left, size = rms(difference[counted]), rms(chosen.strain[counted])
+    verdict, p, beyond = _judged(left / size, error, repeats, points, counted)
     sector = sectors_of(prediction.edges)
     regions: tuple[Region, ...] = ()
-    if fit.verdict == "lack_of_fit":
+    if verdict == "lack_of_fit":
         plain = tuple(f for f in chosen.factors if f.name not in SLIPS)
         slips = tuple(f for f in chosen.factors if f.name in SLIPS)
         regions = find_regions(difference, chosen.strain, counted, plain, repeats, points)
@@ -167,8 +168,10 @@ def compare_strain(waves: Waveforms, model: TireModel, data_hash: str = "") -> C
     by_gage = prediction.gages - waves.strain[:, chosen.gages] + points.shift[:, None, :]
     followed = tracks(waves, chosen.strain, prediction, chosen.tolerance)
     gages = compare_gages(chosen, by_gage, difference, sector, points)
-    said = sentences(regions, prediction.edges) + _beyond(fit, points, chosen)
-    if fit.verdict in ("fits", "lack_of_fit"):
+    said = tuple(sentence(region, prediction.edges) for region in regions)
+    if verdict == "lack_of_fit":
+        said += _beyond(beyond, points, chosen)
+    if verdict in ("fits", "lack_of_fit"):
         said += track_sentences(followed, counted, chosen.factors)
         said += gage_sentences(gages, prediction.edges)
     return Comparison(
@@ -182,7 +185,11 @@ def compare_strain(waves: Waveforms, model: TireModel, data_hash: str = "") -> C
         by_gage,
         sector,
         np.sqrt(np.mean(difference**2, axis=1)),
-        fit,
+        left,
+        size,
+        p,
+        verdict,
+        beyond,
         floor_of(model, data_hash, error, at.take(counted)),
         cells(difference, sector, counted, chosen.factors, repeats, points),
         regions,
@@ -190,7 +197,7 @@ def compare_strain(waves: Waveforms, model: TireModel, data_hash: str = "") -> C
         followed,
         gages,
         (
-            *_messages(chosen, repeats, fit),
+            *_messages(chosen, repeats, verdict, left / size),
             *lag_message(error.delay, error.delay_std, at.omega[counted]),
             *chosen.notes,
         ),
@@ -213,30 +220,17 @@ def _set_points(
     return SetPoints(value, scale, covariance, tangent, shift, first.spread, first.independent)
 
 
-def _part(prediction: Prediction, rows: np.ndarray) -> Prediction:
-    return Prediction(*(getattr(prediction, name)[rows] for name in prediction.__slots__))
-
-
-def _fit(
-    error: ModelError,
-    difference: FloatArray,
-    noise: RepeatNoise,
-    points: SetPoints,
-    chosen: Chosen,
-) -> Fit:
-    counted = chosen.straight
-    rms = _rms(difference[counted])
-    strain_rms = _rms(chosen.strain[counted])
+def _judged(
+    share: float, error: ModelError, noise: RepeatNoise, points: SetPoints, counted: BoolArray
+) -> tuple[str, float, tuple[str, ...]]:
+    """Return verdict, p-value and the set points that are beyond their tolerance."""
     p = float("nan")
     if error.known:
         freedom = points.independent * int(counted.sum())
         p = float(special.fdtrc(freedom, noise.freedom, error.value**2))
-    scaled = np.sqrt(np.mean(points.scaled[counted] ** 2, axis=0))
-    beyond = tuple(name for name, size in zip(NAMES, scaled, strict=True) if size > BEYOND)
-    verdict = verdict_of(rms / strain_rms, p)
-    if verdict == "fits" and beyond:
-        verdict = "lack_of_fit"
-    return Fit(verdict, rms, strain_rms, p, beyond)
+    beyond = tuple(n for k, n in enumerate(SAID) if rms(points.scaled[counted, k]) > BEYOND)
+    verdict = verdict_of(share, p)
+    return "lack_of_fit" if verdict == "fits" and beyond else verdict, p, beyond
 
 
 def verdict_of(share: float, p: float) -> str:
@@ -248,24 +242,17 @@ def verdict_of(share: float, p: float) -> str:
     return "noise_unknown" if np.isnan(p) else "lack_of_fit"
 
 
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def _beyond(fit: Fit, points: SetPoints, chosen: Chosen) -> tuple[str, ...]:
+def _beyond(beyond: Sequence[str], points: SetPoints, chosen: Chosen) -> tuple[str, ...]:
     """Say which set points would have to be off by far more than their tolerance."""
-    if fit.verdict != "lack_of_fit":
-        return ()
     out = []
-    for name in fit.beyond:
-        k = NAMES.index(name)
-        value = points.value[chosen.straight, k]
-        rms = float(np.sqrt(np.mean(points.scaled[chosen.straight, k] ** 2)))
-        size, unit = (1e3, "mrad") if name == "angle" else (100.0, "%")
+    for k, (name, (_, unit, factor)) in enumerate(SAID.items()):
+        if name not in beyond:
+            continue
+        value = factor * points.value[chosen.straight, k]
         out.append(
-            f"From run to run the {_MEANT[name]} differs from {size * value.min():+.2g} to "
-            f"{size * value.max():+.2g} {unit}, {rms:.1f} times the tolerance (rms): something "
-            "that the model lacks acts in this way."
+            f"From run to run the {_MEANT[name]} differs from {value.min():+.2g} to "
+            f"{value.max():+.2g} {unit}, {rms(points.scaled[chosen.straight, k]):.1f} times the "
+            "tolerance (rms): something that the model lacks acts in this way."
         )
     return tuple(out)
 
@@ -278,13 +265,13 @@ _MEANT = {
 }
 
 
-def _messages(chosen: Chosen, noise: RepeatNoise, fit: Fit) -> tuple[str, ...]:
+def _messages(chosen: Chosen, noise: RepeatNoise, verdict: str, share: float) -> tuple[str, ...]:
     """Say what limits the comparison."""
     name = chosen.waves.header.name
     out = []
-    if fit.verdict == "does_not_fit":
+    if verdict == "does_not_fit":
         out.append(
-            f"The model does not fit at all: it leaves {100 * fit.rms / fit.strain_rms:.0f} % of "
+            f"The model does not fit at all: it leaves {100 * share:.0f} % of "
             f"the measured strain (no model leaves 100 %, {100 * NO_FIT:.0f} % is the limit). "
             "Where it fails says nothing then; identify it from this campaign first, or look for "
             "a wrong unit, sign or tire."

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import special
 
 from tirelib.campaign import Tolerance
-from tirelib.core.arrays import BoolArray, FloatArray, IntArray
+from tirelib.core.arrays import BoolArray, FloatArray, IntArray, rms
 from tirelib.inference.compare.model import Prediction
 from tirelib.inference.compare.regions import LEAST_SHARE, LEVEL, SLIPS, subsets
 from tirelib.inference.compare.runs import Factor
@@ -44,8 +44,6 @@ class Track:
         Noise of the measured number, from repeats; NaN without.
     freedom : int
         Degrees of freedom of the noise.
-    constant : bool
-        Whether the measured number may hold a constant error of the rig.
     """
 
     name: str
@@ -56,7 +54,11 @@ class Track:
     model_std: FloatArray
     noise: float
     freedom: int
-    constant: bool = False
+
+    @property
+    def constant(self) -> bool:
+        """Whether the measured number may hold a constant error of the rig."""
+        return self.name == "deflection"
 
     def in_noise(self, rms: float) -> float:
         """Return an rms in units of the noise; NaN where repeats are the same to the last digit."""
@@ -84,12 +86,6 @@ def contact_edges(strain: FloatArray) -> FloatArray:
     return np.stack([entry, leaving], axis=1)
 
 
-def contact_angle(strain: FloatArray) -> FloatArray:
-    """Return the angle from the steepest rise of strain to its steepest fall, (n_runs,), [rad]."""
-    edges = contact_edges(strain)
-    return np.asarray(edges[:, 1] - edges[:, 0])
-
-
 def tracks(
     waves: Waveforms, strain: FloatArray, prediction: Prediction, tolerance: Tolerance
 ) -> tuple[Track, ...]:
@@ -106,36 +102,23 @@ def tracks(
     ]
     lengths = [np.diff(edges, axis=1)[:, 0] for edges in (measured, model)]
     spread = np.hypot(*(np.diff(part, axis=1)[:, 0] for part in moved))
-    per_angle, unit, scale = np.ones(len(strain)), "deg", float(np.rad2deg(1.0))
+    degree = float(np.rad2deg(1.0))
+    per_angle, unit, scale = np.ones(len(strain)), "deg", degree
     if np.isfinite(radius).all():
         per_angle, unit, scale = radius, "mm", 1e3
-    length = [per_angle * part for part in (*lengths, spread)]
-    out = [_track("contact length", unit, scale, length, group)]
+    found = {"contact length": (unit, scale, [per_angle * part for part in (*lengths, spread)])}
     deflection = waves.header.tire.free_radius - c["loaded_radius"]
     if np.isfinite(deflection).any():
         by_load = np.abs(prediction.deflection_by_load) * tolerance.load
-        depth = [deflection, prediction.deflection, by_load]
-        out.append(_track("deflection", "mm", 1e3, depth, group, constant=True))
+        found["deflection"] = "mm", 1e3, [deflection, prediction.deflection, by_load]
     zero = np.minimum(waves.angle_std, 1.0)
     for side, name in enumerate(("contact entry", "contact exit")):
         std = np.sqrt(moved[0][:, side] ** 2 + moved[1][:, side] ** 2 + zero**2)
-        angle = [measured[:, side], model[:, side], std]
-        out.append(_track(name, "deg", float(np.rad2deg(1.0)), angle, group))
-    return tuple(out)
-
-
-def _track(
-    name: str,
-    unit: str,
-    scale: float,
-    numbers: Sequence[FloatArray],
-    group: IntArray,
-    *,
-    constant: bool = False,
-) -> Track:
-    measured, model, std = numbers
-    noise, freedom = pooled(measured - model, group)
-    return Track(name, unit, scale, measured, model, std, noise, freedom, constant)
+        found[name] = "deg", degree, [measured[:, side], model[:, side], std]
+    return tuple(
+        Track(name, unit, scale, seen, said, std, *pooled(seen - said, group))
+        for name, (unit, scale, (seen, said, std)) in found.items()
+    )
 
 
 def pooled(values: FloatArray, group: IntArray) -> tuple[float, int]:
@@ -190,9 +173,7 @@ def track_fit(track: Track, counted: BoolArray) -> TrackFit:
     d = track.difference[shown]
     if not d.size:
         return TrackFit(0, *(4 * [float("nan")]))
-    return TrackFit(
-        d.size, float(d.mean()), _std(track, shown), float(np.sqrt(np.mean(d**2))), float(d.std())
-    )
+    return TrackFit(d.size, float(d.mean()), _std(track, shown), rms(d), float(d.std()))
 
 
 def track_sentences(

@@ -105,14 +105,17 @@ def _worst(row: Mapping[str, Any], key: str) -> float | None:
     return max((fold[key] for fold in row["held_out"]), default=None)
 
 
-def maps(before: Comparison, after: Comparison) -> list[Plot]:
-    """Return the residual of every run before and after, on one colour scale."""
-    return _paired([heat_maps(found)[:1] for found in (before, after)])
+def maps(before: Comparison | ForceComparison, after: Comparison | ForceComparison) -> list[Plot]:
+    """Return the residual of every run before and after, on one colour scale.
 
-
-def force_maps(before: ForceComparison, after: ForceComparison) -> list[Plot]:
-    """Return difference over slip and load and the force over its slip, before and after."""
-    return _paired([force_plots(found)[:2] for found in (before, after)])
+    Of a force these are the difference over slip and load, and the force over its slip.
+    """
+    return _paired(
+        [
+            force_plots(found)[:2] if isinstance(found, ForceComparison) else heat_maps(found)[:1]
+            for found in (before, after)
+        ]
+    )
 
 
 def _paired(pair: Sequence[Sequence[Plot]]) -> list[Plot]:
@@ -129,17 +132,17 @@ def _paired(pair: Sequence[Sequence[Plot]]) -> list[Plot]:
 
 
 class Step(NamedTuple):
-    """A model on the way: label, error of its fit, error on held-out points (NaN if unknown)."""
+    """A model on the way: label, error of its fit, error on held-out points (None if unknown)."""
 
     label: str
-    error: float
-    held_out: float
+    error: float | None
+    held_out: float | None
 
 
 def waterfall(
     steps: Sequence[Step],
     unit: str,
-    floor: float,
+    floor: float | None,
     name: str = "waterfall",
     title: str = "The model's history",
 ) -> Plot:
@@ -149,24 +152,24 @@ def waterfall(
     ----------
     unit : str
         Unit of the errors.
-    floor : float
+    floor : float, optional
         Error that structure leaves without a missing effect; NaN if unknown.
     """
     labels = [f"{k}: {step.label}" if k else step.label for k, step in enumerate(steps)]
     figure = go.Figure()
-    errors, held = [step.error for step in steps], [step.held_out for step in steps]
+    errors, held = np.array([step[1:] for step in steps], dtype=np.float64).T  # None becomes NaN
     for values, what, colour in ((errors, "fitted", BLUE), (held, "held out", RED)):
         if np.isfinite(values).any():
             figure.add_bar(
                 x=labels,
-                y=[float(value) if np.isfinite(value) else None for value in values],
+                y=values,
                 name=what,
                 marker={"color": colour},
                 text=[f"{value:.3g}" if np.isfinite(value) else "" for value in values],
                 textposition="outside",
                 cliponaxis=False,
             )
-    if np.isfinite(floor):
+    if floor is not None and np.isfinite(floor):
         figure.add_hline(
             y=floor,
             line={"dash": "dot", "color": FAINT},
@@ -175,36 +178,28 @@ def waterfall(
         )
     figure.update_yaxes(title=f"error [{unit}]", rangemode="tozero")
     figure.update_xaxes(title="effect added (-: removed)")
-    styled_figure(figure, 380, barmode="group")
     return Plot.of(
         name,
         title,
         "Rms error after each step, fitted anew each time; held out: on points that took no part "
         "in the fit.",
-        figure,
+        styled_figure(figure, 380, barmode="group"),
         {"step": labels, f"error [{unit}]": errors, f"held-out error [{unit}]": held},
     )
 
 
-def waterfall_of(history: Sequence[Mapping[str, Any]], quantity: str) -> Plot | None:
-    """Return the fall across a model's history for one quantity, or None without entries."""
+def waterfall_of(history: Sequence[Mapping[str, Any]], quantity: str) -> list[Plot]:
+    """Return the fall across a model's history for one quantity; nothing without entries."""
     rows = fall_of(history, quantity)
     if not rows:
-        return None
+        return []
     unit = rows[0]["unit"]
     last = [e for e in history if e.get("quantity", "strain") == quantity][-1]
     floor = last.get("floor" if unit == "noise" else f"floor_{unit}")
-    steps = [
-        Step(_label(row["action"], row["effect"]), _size(row["error"]), _size(row["heldout_error"]))
-        for row in rows
-    ]
+    steps = [Step(_label(**row), row["error"], row["heldout_error"]) for row in rows]
     name, title = f"history-{quantity}", f"The model's history, {quantity}"
-    return waterfall(steps, unit_name(unit), _size(floor), name, title)
+    return [waterfall(steps, unit_name(unit), floor, name, title)]
 
 
-def _label(action: str, effect: str | None) -> str:
+def _label(action: str, effect: str | None, **_: Any) -> str:
     return "before" if effect is None else f"{'-' if action == 'remove' else ''}{effect}"
-
-
-def _size(value: float | None) -> float:
-    return float("nan") if value is None else float(value)

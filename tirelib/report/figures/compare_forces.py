@@ -1,36 +1,34 @@
 """Figures of forces, measured and by one model or two: curves, and differences over conditions."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray, rms
 from tirelib.core.quantities import QUANTITIES
-from tirelib.inference.compare.force_curves import Curve, curves_of, ranked, slip_of
-from tirelib.inference.compare.forces import UNITS, ForceComparison
+from tirelib.inference.compare.force_curves import Curve, curves_of, ranked
+from tirelib.inference.compare.force_model import slip_of
+from tirelib.inference.compare.forces import ForceComparison
 from tirelib.inference.compare.sentences import told
 from tirelib.inference.identify.error_bands import levels
 from tirelib.inference.identify.force_points import CELL_ANGLE
 from tirelib.report.figures.compare_plot import (
     SYMBOLS,
     Plot,
-    Trace,
-    above,
-    confidence,
+    cell_means,
+    curves,
     dots,
+    fall,
     heat,
-    level_line,
-    level_means,
     line,
     noise_band,
-    stacked,
     styled_figure,
     ticks,
+    trend,
 )
-from tirelib.report.page import number
-from tirelib.report.style import BLUE, CATEGORIES, FAINT, INK, RED
+from tirelib.report.style import BLUE, CATEGORIES, FAINT
 
 _OVER = ("slip_angle", "slip_ratio", "camber", "load", "pressure")
 _LISTED = ("load", "pressure", "slip_angle", "camber", "slip_ratio")
@@ -42,10 +40,6 @@ LESS = "model less measured"
 def force_plots(found: ForceComparison) -> list[Plot]:
     """Return the map, the force over its slip, the agreement, and differences."""
     return [_map(found), _over_slip(found), _agreement(found), _differences(found)]
-
-
-def _label(found: ForceComparison) -> str:
-    return f"{found.quantity} [{UNITS[found.quantity]}] (ISO 8855)"
 
 
 def _told(found: ForceComparison, name: str) -> FloatArray:
@@ -70,14 +64,10 @@ def _map(found: ForceComparison) -> Plot:
     slip = QUANTITIES[slip_of(found.quantity)]
     x, column = _binned(found, slip_of(found.quantity))
     y, row = _binned(found, "load")
-    unit, factor = UNITS[found.quantity], 1.0
+    unit, factor = found.unit, 1.0
     if np.isfinite(found.noise):
         unit, factor = "noise", 1.0 / found.noise
-    z = np.full((y.size, x.size), np.nan)
-    for i, j in np.ndindex(*z.shape):
-        inside = (row == i) & (column == j)
-        if inside.any():
-            z[i, j] = factor * float(found.difference[inside].mean())
+    z = factor * cell_means(found.difference, row, column, (y.size, x.size))
     labels = [told("load", 50.0 * round(float(v) / 50.0)) for v in y]
     figure = heat(z, x, slip.label, unit, 220 + 34 * y.size, hoverongaps=False)
     ticks(figure, range(y.size), labels, "load [N]")
@@ -93,65 +83,37 @@ def _map(found: ForceComparison) -> Plot:
     )
 
 
-def curve_plots(found: ForceComparison, curves: tuple[Curve, ...]) -> list[Plot]:
-    """Return measurement and model over the slip for the best, the median and the worst curve."""
-    return [_one(found, curve, name) for name, curve in ranked(curves).items()]
+def curve_plots(*found: ForceComparison) -> list[Plot]:
+    """Return measurement and model over the slip for the best, the median and the worst curve.
+
+    Of two models, before and after a change, each figure shows both, the worst curve first.
+    """
+    named = ranked(curves_of(found[0]))
+    order = reversed(named) if len(found) > 1 else named
+    return [_curve(found, named[name], name) for name in order]
 
 
-def force_curves(before: ForceComparison, after: ForceComparison) -> list[Plot]:
-    """Return both models' forces on the worst, the median and the best curve of before."""
-    named = ranked(curves_of(before))
-    return [_two(before, after, named[name], name) for name in reversed(named)]
-
-
-def _one(found: ForceComparison, curve: Curve, place: str) -> Plot:
-    slip, unit, k = slip_of(found.quantity), UNITS[found.quantity], curve.member
-    x, label = _told(found, slip)[k], QUANTITIES[slip].label
-    measured, model, rest = found.measured[k], found.predicted[k], found.difference[k]
-    figure = stacked(
-        [dots(x, measured, "measured", BLUE, 6), dots(x, model, "model", RED, 6, symbol="x")],
-        [dots(x, rest, LESS, INK, 5)],
-        (label, _label(found)),
-        unit,
-        found.noise,
-    )
-    noise = f", {curve.rms / found.noise:.1f} noise" if np.isfinite(found.noise) else ""
-    names = (f"{what} [{unit}]" for what in ("measured", "model", LESS))
-    return Plot.of(
-        f"force-{place}",
-        f"{place.capitalize()} curve: {curve.words}",
-        f"Difference {curve.rms:.3g} {unit} rms{noise}, {curve.points} points. The model is "
-        "computed at the conditions of each point. Grey: 95 % of the noise.",
-        figure,
-        {label: x, **dict(zip(names, (measured, model, rest), strict=True))},
-        5,
-    )
-
-
-def _two(before: ForceComparison, after: ForceComparison, curve: Curve, name: str) -> Plot:
-    slip, unit, k = slip_of(before.quantity), UNITS[before.quantity], curve.member
-    x, label, measured = _told(before, slip)[k], QUANTITIES[slip].label, before.measured[k]
-    data = {label: x, f"measured [{unit}]": measured}
-    values: list[Trace] = [dots(x, measured, "measured", INK, symbol="circle-open")]
-    differences: list[Trace] = []
-    looks = ((before, "before", RED, "x"), (after, "after", BLUE, "circle"))
-    for found, word, colour, symbol in looks:
-        model, rest = found.predicted[k], found.difference[k]
-        data |= {f"model {word} [{unit}]": model, f"{word} less measured [{unit}]": rest}
-        values.append(dots(x, model, f"model {word}", colour, 5, symbol=symbol))
-        trace = dots(x, rest, f"model {word} minus measured", colour, 5, symbol=symbol)
-        differences.append(trace | {"showlegend": False})
-    was, is_now = (
-        number(float(np.sqrt(np.mean(found.difference[k] ** 2))), 3) for found in (before, after)
-    )
-    return Plot.of(
-        f"curve-{name}",
-        f"{name.capitalize()} curve of before: {curve.words}",
-        f"The difference was {was} {unit} rms and is {is_now}. The models are computed at the "
-        "conditions of each point. Grey: 95 % of the noise.",
-        stacked(values, differences, (label, _label(before)), unit, before.noise),
-        data,
-        5,
+def _curve(found: Sequence[ForceComparison], curve: Curve, name: str) -> Plot:
+    first, k, (start, of) = found[0], curve.member, ("force", "curve")
+    if len(found) > 1:
+        start, of = "curve", "curve of before"
+    x, slip = _told(first, slip_of(first.quantity))[k], QUANTITIES[slip_of(first.quantity)]
+    sizes = [rms(each.difference[k]) for each in found]
+    return curves(
+        (
+            f"{start}-{name}",
+            f"{name.capitalize()} {of}: {curve.words}",
+            f"{fall(sizes, first.unit, first.noise)} The models are computed at "
+            f"the conditions of each of the {curve.points} points. Grey: 95 % of the noise.",
+        ),
+        lambda values, what, colour, which: dots(
+            x, values, what, colour, 6, symbol=("circle-open", "x", "circle")[which]
+        ),
+        ("measured", first.measured[k]),
+        [(each.predicted[k], each.difference[k]) for each in found],
+        (slip.label, QUANTITIES[first.quantity].label),
+        first.unit,
+        first.noise,
     )
 
 
@@ -173,7 +135,6 @@ def _varied(found: ForceComparison) -> Iterator[str]:
 
 
 def _trend(found: ForceComparison, name: str) -> Plot:
-    unit, label = UNITS[found.quantity], QUANTITIES[name].label
     x, column = _binned(found, name)
     if name in (slip_of(found.quantity), "camber"):  # which shifts both signs of a force alike
         what, text, values = f"{LESS} {found.quantity}", "", found.difference
@@ -183,20 +144,19 @@ def _trend(found: ForceComparison, name: str) -> Plot:
             ("The differences are those of the magnitudes, because both signs of the slip occur. "),
         )
         values = np.abs(found.predicted) - np.abs(found.measured)
-    centre, half, count = level_means(values, column, x.size)
-    figure = go.Figure()
-    confidence(figure, x, centre, half, "points")
-    level_line(figure)
-    figure.update_xaxes(title=label)
-    figure.update_yaxes(title=f"{what} [{unit}]")
-    return Plot.of(
-        f"force-trend-{name.replace('_', '-')}",
-        f"Mean difference by {QUANTITIES[name].title}",
-        f"{text}The band is the 95 % confidence interval of the bin's mean, from the scatter of "
-        "its points over the other conditions; bins of one point have none.",
-        styled_figure(figure, 380, legend=above()),
-        {label: x, "points": count, f"{what} [{unit}]": centre, f"95 % half-width [{unit}]": half},
-        5,
+    return trend(
+        (
+            f"force-trend-{name.replace('_', '-')}",
+            f"Mean difference by {QUANTITIES[name].title}",
+            f"{text}The band is the 95 % confidence interval of the bin's mean, from the scatter "
+            "of its points over the other conditions; bins of one point have none.",
+        ),
+        QUANTITIES[name].label,
+        x,
+        column,
+        {"": values},
+        (what, found.unit),
+        "points",
     )
 
 
@@ -212,7 +172,7 @@ def _over_slip(found: ForceComparison) -> Plot:
         figure.add_scatter(**dots(at, measured, f"measured, {load}", colour, symbol=symbol))
         figure.add_scatter(**line(at, model, f"model, {load}", colour, dash="dash"))
     figure.update_xaxes(title=slip.label)
-    figure.update_yaxes(title=_label(found))
+    figure.update_yaxes(title=QUANTITIES[found.quantity].label)
     return _points(
         found,
         "force-slip",
@@ -225,7 +185,7 @@ def _over_slip(found: ForceComparison) -> Plot:
 
 def _points(found: ForceComparison, name: str, title: str, caption: str, figure: go.Figure) -> Plot:
     """Return a plot whose data are all points."""
-    unit, data = UNITS[found.quantity], {}
+    unit, data = found.unit, {}
     for each in _LISTED:
         data[f"{QUANTITIES[each].title} [{QUANTITIES[each].words or '-'}]"] = _told(found, each)
     names = (f"{what} [{unit}]" for what in ("measured", "model", LESS))
@@ -238,8 +198,8 @@ def _agreement(found: ForceComparison) -> Plot:
     ends, figure = [float(both.min()), float(both.max())], go.Figure()
     figure.add_scatter(**line(ends, ends, "model = measured", FAINT, width=1))
     figure.add_scatter(**dots(found.measured, found.predicted, "points", BLUE, 6))
-    figure.update_xaxes(title=f"measured {_label(found)}")
-    figure.update_yaxes(title=f"model {_label(found)}")
+    figure.update_xaxes(title=f"measured {QUANTITIES[found.quantity].label}")
+    figure.update_yaxes(title=f"model {QUANTITIES[found.quantity].label}")
     styled_figure(figure, 480, legend={"orientation": "h", "y": 1.1})
     return _points(found, "force-agreement", "Agreement", "Model against measurement.", figure)
 
@@ -252,7 +212,7 @@ def _differences(found: ForceComparison) -> Plot:
         figure.add_scatter(**trace, showlegend=False, row=1, col=k)
         figure.update_xaxes(title=QUANTITIES[name].label, row=1, col=k)
         noise_band(figure, found.noise, row=1, col=k)
-    figure.update_yaxes(title=f"{LESS} {found.quantity} [{UNITS[found.quantity]}]", row=1, col=1)
+    figure.update_yaxes(title=f"{LESS} {found.quantity} [{found.unit}]", row=1, col=1)
     return _points(
         found,
         "force-differences",

@@ -1,9 +1,8 @@
 """Figures of strain: model less measured over angle and condition, and waveforms of runs."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-import plotly.graph_objects as go
 
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.quantities import QUANTITIES
@@ -14,19 +13,15 @@ from tirelib.report.figures.compare_plot import (
     ANGLE_TITLE,
     DEGREES,
     Plot,
-    Trace,
     above,
+    curves,
+    fall,
     line,
-    stacked,
-    ticks,
     turn_map,
 )
-from tirelib.report.style import BLUE, FAINT, INK, RED
+from tirelib.report.style import FAINT, INK
 
-NAMES = {name: quantity.title for name, quantity in QUANTITIES.items()} | {"gage": "gage"}
 SIGN = "Red: the model shows too much tension (too little compression); blue: too much compression."
-MOST_NAMED_ROWS = 12
-"""Rows of a map up to which the pointer names the row."""
 _SLIPS = {
     "slip_angle": (" deg slip angle", 0.25),
     "camber": (" deg camber", 0.25),
@@ -46,8 +41,9 @@ def heat_maps(found: Comparison) -> list[Plot]:
         data = np.stack([found.difference[m].mean(axis=0) for m in members])
         labels = [told(factor.name, value) for value in factor.values]
         count = [int(m.sum()) for m in members]
-        unit = QUANTITIES[factor.name].words
-        plots.append(_map(found, data, labels, count, factor.name, unit))
+        quantity = QUANTITIES[factor.name]
+        axes = f"{quantity.title} (ISO 8855)" if quantity.signed else quantity.title
+        plots.append(_map(found, data, labels, count, (factor.name, axes, quantity.heading)))
     return plots
 
 
@@ -60,7 +56,8 @@ def gage_plots(found: Comparison) -> list[Plot]:
     order = np.argsort(lateral)
     data = found.by_gage[straight].mean(axis=0)[order]
     labels = [f"y = {millimetres(y)}" for y in lateral[order]]
-    return [_map(found, data, labels, [int(straight.sum())] * len(labels), "gage", "mm")]
+    said = "gage", "gage (ISO 8855)", "gage [mm]"
+    return [_map(found, data, labels, [int(straight.sum())] * len(labels), said)]
 
 
 def unit_of(found: Comparison) -> tuple[float, str]:
@@ -87,9 +84,21 @@ def _runs(found: Comparison) -> Plot:
         f"run {found.run[i]}: {c['Fz'][i]:.0f} N, {place_of(found, i)}{_slip(found, i)}"
         for i in order
     ]
-    figure = _turns(data, labels, unit, 620)
-    ticks(figure, *_load_ticks(found, order), "runs by load [N], then pressure and speed")
-    figure.update_yaxes(range=[-0.5, len(order) - 0.5])
+    plot = turn_map(
+        (
+            "heat-runs",
+            "Every run: model less measured",
+            f"In units of {'the noise of the repeats' if unit == 'noise' else 'microstrain'}; set "
+            f"points taken out; colours end at the 99.5 % quantile. {SIGN} Lines: the model's "
+            "contact.",
+        ),
+        data,
+        labels,
+        (*_load_ticks(found, order), "runs by load [N], then pressure and speed"),
+        unit,
+        620,
+    )
+    plot.figure.update_yaxes(range=[-0.5, len(order) - 0.5])
     edges = np.rad2deg(found.prediction.edges[order])
     first = int(straight.sum())  # between the counted runs and the others the lines are open
     edges = np.insert(edges, first, np.nan, axis=0)
@@ -97,16 +106,9 @@ def _runs(found: Comparison) -> Plot:
     for side, name, dash in ((0, "entry", "dot"), (1, "exit", "solid")):
         text = f"{name} of the contact (model)"
         trace = line(np.round(edges[:, side], 2), rows, text, INK, width=1.2, dash=dash)
-        figure.add_scatter(**trace, hoverinfo="skip")
-    figure.update_layout(showlegend=True, legend=above(1.08))
-    return Plot.of(
-        "heat-runs",
-        "Every run: model less measured",
-        f"In units of {'the noise of the repeats' if unit == 'noise' else 'microstrain'}; set "
-        f"points taken out; colours end at the 99.5 % quantile. {SIGN} Lines: the model's contact.",
-        figure,
-        *_data(labels, "run", data, unit),
-    )
+        plot.figure.add_scatter(**trace, hoverinfo="skip")
+    plot.figure.update_layout(showlegend=True, legend=above(1.08))
+    return plot
 
 
 def _slip(found: Comparison, i: int) -> str:
@@ -138,129 +140,60 @@ def _map(
     data: FloatArray,
     labels: Sequence[str],
     count: Sequence[int],
-    name: str,
-    unit: str,
+    names: tuple[str, str, str],
 ) -> Plot:
-    factor, noise = unit_of(found)
-    said = [f"{text} ({n} runs)" for text, n in zip(labels, count, strict=True)]
-    figure = _turns(factor * data, said, noise, 200 + 34 * len(labels))
-    title = f"{NAMES[name]}{f' [{unit}]' if unit else ''}"
-    ticks(figure, range(len(labels)), labels, title)
-    axes = " (ISO 8855)" if name == "gage" or QUANTITIES[name].signed else ""
-    return Plot.of(
-        f"heat-{name.replace('_', '-')}",
-        f"By {NAMES[name]}{axes}",
-        f"Mean over the runs of each level. {SIGN}",
-        figure,
-        *_data(labels, title, factor * data, noise),
+    """Return the map by a condition: its name, in the plot's title, and of the axis."""
+    (factor, noise), (name, title, axis) = unit_of(found), names
+    return turn_map(
+        (
+            f"heat-{name.replace('_', '-')}",
+            f"By {title}",
+            f"Mean over the runs of each level. {SIGN}",
+        ),
+        factor * data,
+        [f"{text} ({n} runs)" for text, n in zip(labels, count, strict=True)],
+        (range(len(labels)), labels, axis),
+        noise,
+        200 + 34 * len(labels),
     )
 
 
-def _turns(data: FloatArray, labels: Sequence[str], unit: str, height: int) -> go.Figure:
-    """Return a map whose rows the pointer names, where they are few."""
-    if len(labels) > MOST_NAMED_ROWS:
-        return turn_map(data, unit, height)
-    said = np.broadcast_to(np.array(labels, dtype=object)[:, None], data.shape)
-    hover = "%{text}<br>%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>"
-    return turn_map(data, unit, height, text=said, hovertemplate=hover)
+def waveform_plots(*found: Comparison) -> list[Plot]:
+    """Return a figure for the best, the median and the worst run (one run: a single figure).
+
+    Of two models, before and after a change, each figure shows both, the worst run first.
+    """
+    named = {i: name for name, i in reversed(found[0].ranked().items())}
+    order = named.items() if len(found) > 1 else reversed(named.items())
+    return [_waveforms(found, i, name) for i, name in order]
 
 
-def _data(
-    labels: Sequence[str], first: str, data: FloatArray, unit: str
-) -> tuple[list[tuple[str, FloatArray]], int]:
-    """Return the data, a row per angle and a column per level, and their decimals."""
-    named = [f"{first} {text}: [{unit}]" for text in labels]
-    return [("wheel angle [deg]", DEGREES), *zip(named, data, strict=True)], 4
-
-
-def waveform_plots(found: Comparison) -> list[Plot]:
-    """Return a figure for the best, the median and the worst run (one run: a single figure)."""
-    return [_one(found, i, name) for name, i in _ranked(found)]
-
-
-def waveforms(before: Comparison, after: Comparison) -> list[Plot]:
-    """Return both models' waveforms of the worst, the median and the best run of before."""
-    return [_two(before, after, i, name) for name, i in _ranked(before, worst_first=True)]
-
-
-def _ranked(found: Comparison, *, worst_first: bool = False) -> Iterator[tuple[str, int]]:
-    """Return names and numbers of runs, each run once."""
-    named = [*zip(("best", "median", "worst"), found.ranked(), strict=True)]
-    seen: set[int] = set()
-    for name, i in reversed(named) if worst_first else named:
-        if i not in seen:
-            yield name, i
-        seen.add(i)
-
-
-def _curves(
-    values: Sequence[Trace], differences: Sequence[Trace], edges: FloatArray, noise: float | None
-) -> go.Figure:
-    """Return waveforms over their differences, the contact's edges [rad] dotted."""
-    titles = ANGLE_TITLE, f"strain [{_UNIT}]"
-    figure = stacked(values, differences, titles, _UNIT, noise)
-    for edge in np.rad2deg(edges):
-        figure.add_vline(x=float(edge), line={"color": FAINT, "width": 1, "dash": "dot"})
-    figure.update_xaxes(range=[-HALF, HALF], dtick=20)
-    return figure.update_yaxes(tickformat=",", row=1, col=1)
-
-
-def _title(found: Comparison, i: int, what: str) -> str:
-    load = found.chosen.waves.conditions["Fz"][i]
-    return f"{what}: {found.run[i]} ({load:,.0f} N, {place_of(found, i)})"
-
-
-def _one(found: Comparison, i: int, name: str) -> Plot:
-    model, difference = 1e6 * found.prediction.strain[i], 1e6 * found.difference[i]
-    measured = 1e6 * (found.chosen.strain[i] - found.points.shift[i])
-    taken, less = "measured, set points taken out", "model less measured"
-    values = [
-        line(DEGREES, measured, taken, BLUE, width=2),
-        line(DEGREES, model, "model", RED, width=2, dash="dash"),
-    ]
-    rest = line(DEGREES, difference, less, INK, width=1.5)
-    edges, known = found.prediction.edges[i], found.noise.known
-    figure = _curves(values, [rest], edges, 1e6 * found.noise.std)
-    noise = f", {found.run_rms[i] / found.noise.std:.1f} noise" if known else ""
-    return Plot.of(
-        f"waveform-{name}",
-        _title(found, i, f"{name.capitalize()} run"),
-        f"Difference {1e6 * found.run_rms[i]:.0f} {_UNIT} rms{noise}; strain without its mean over "
-        "the turn, mean over the gages, tension positive. Dotted: edges of the model's contact. "
-        "Grey: 95 % of the noise.",
-        figure,
-        {
-            "wheel angle [deg]": DEGREES,
-            f"{taken} [{_UNIT}]": measured,
-            f"model [{_UNIT}]": model,
-            f"{less} [{_UNIT}]": difference,
-        },
-        3,
+def _waveforms(found: Sequence[Comparison], i: int, name: str) -> Plot:
+    first, text, title = found[0], "measured", f"{name.capitalize()} run of before"
+    measured, noise = first.chosen.strain[i], first.noise.std
+    if len(found) == 1:
+        measured, text = measured - first.points.shift[i], "measured, set points taken out"
+        title = f"{name.capitalize()} run"
+    load = first.chosen.waves.conditions["Fz"][i]
+    plot = curves(
+        (
+            f"waveform-{name}",
+            f"{title}: {first.run[i]} ({load:,.0f} N, {place_of(first, i)})",
+            f"{fall([1e6 * float(each.run_rms[i]) for each in found], _UNIT, 1e6 * noise)} It is "
+            "corrected for set points. Strain without its mean over the turn, mean over the gages, "
+            "tension positive. Dotted: edges of the model's contact. Grey: 95 % of the noise.",
+        ),
+        lambda values, what, colour, k: line(
+            DEGREES, values, what, colour, width=2, dash=("solid", "dash", "solid")[k]
+        ),
+        (text, 1e6 * measured),
+        [(1e6 * each.prediction.strain[i], 1e6 * each.difference[i]) for each in found],
+        (ANGLE_TITLE, f"strain [{_UNIT}]"),
+        _UNIT,
+        1e6 * noise,
     )
-
-
-def _two(before: Comparison, after: Comparison, i: int, name: str) -> Plot:
-    measured = 1e6 * before.chosen.strain[i]
-    values: list[Trace] = [line(DEGREES, measured, "measured", INK, width=2.5)]
-    differences: list[Trace] = []
-    models, rest = {}, {}
-    for found, word, colour, dash in (
-        (before, "before", RED, "dash"),
-        (after, "after", BLUE, "solid"),
-    ):
-        model, left = 1e6 * found.prediction.strain[i], 1e6 * found.difference[i]
-        models[f"model {word} [{_UNIT}]"], rest[f"{word} less measured [{_UNIT}]"] = model, left
-        values.append(line(DEGREES, model, f"model {word}", colour, dash=dash))
-        trace = line(DEGREES, left, f"model {word} minus measured", colour, width=1.5, dash=dash)
-        differences.append(trace | {"showlegend": False})
-    was, is_now = (1e6 * float(found.run_rms[i]) for found in (before, after))
-    return Plot.of(
-        f"waveform-{name}",
-        _title(before, i, f"{name.capitalize()} run of before"),
-        f"The difference, corrected for set points, was {was:.0f} {_UNIT} rms and is now "
-        f"{is_now:.0f}. Shown is the strain minus its mean over the turn, averaged over the "
-        "gages, tension positive. Dotted: edges of the contact of the model after.",
-        _curves(values, differences, after.prediction.edges[i], None),
-        {"wheel angle [deg]": DEGREES, f"measured [{_UNIT}]": measured, **models, **rest},
-        3,
-    )
+    for edge in np.rad2deg(found[-1].prediction.edges[i]):
+        plot.figure.add_vline(x=float(edge), line={"color": FAINT, "width": 1, "dash": "dot"})
+    plot.figure.update_xaxes(range=[-HALF, HALF], dtick=20)
+    plot.figure.update_yaxes(tickformat=",", row=1, col=1)
+    return plot

@@ -3,7 +3,7 @@
 import base64
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,7 @@ from scipy.special import stdtrit
 
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.measured.waveforms import GRID
-from tirelib.report.style import BLUE, FAINT, INK, RULE
+from tirelib.report.style import BLUE, FAINT, INK, RED, RULE
 
 DIVERGING = [
     [0.0, "#0b4f86"],
@@ -26,9 +26,13 @@ DIVERGING = [
 """Blue: too much compression; red: too much tension."""
 DEGREES = np.rad2deg(GRID)
 ANGLE_TITLE = "wheel angle [deg], entry < 0 < exit"
+MOST_NAMED_ROWS = 12
+"""Rows of a map up to which the pointer names the row."""
 SYMBOLS = ("circle", "square", "triangle-up", "diamond", "cross", "x")
 Trace = Mapping[str, Any]
 """Arguments of plotly's `add_scatter`."""
+Said = tuple[str, str, str]
+"""Name, title and caption of a plot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,38 +125,57 @@ def styled_figure(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
     return figure
 
 
-def stacked(
-    values: Sequence[Trace],
-    differences: Sequence[Trace],
+def curves(
+    said: Said,
+    draw: Callable[[FloatArray, str, str, int], Trace],
+    measured: tuple[str, FloatArray],
+    models: Sequence[tuple[FloatArray, FloatArray]],
     titles: tuple[str, str],
     unit: str,
-    noise: float | None = None,
-) -> go.Figure:
-    """Return curves above and the differences between them below, over one axis.
+    noise: float,
+) -> Plot:
+    """Return measurement and models above, and the differences between them below.
 
     Parameters
     ----------
-    values, differences : sequence of Trace
-        Traces of the upper and of the lower panel.
+    draw : callable
+        Takes values, what they are, a colour, and 0 for the measurement, 1 and 2 for the models.
+    measured : (text, values)
+    models : sequence of (values, model less measured)
+        One, or those before and after a change.
     titles : (x, y)
         Of the common axis, and of the upper panel.
     unit : str
-        That of the differences.
-    noise : float, optional
-        Its 95 % are a grey band behind the differences.
+    noise : float
+        Its 95 % are a grey band behind the differences; NaN where it is unknown.
     """
     figure = make_subplots(
         rows=2, cols=1, shared_xaxes=True, row_heights=[0.65, 0.35], vertical_spacing=0.06
     )
-    for row, traces in enumerate((values, differences), start=1):
-        for trace in traces:
-            figure.add_scatter(**trace, row=row, col=1)
-    if noise is not None:
-        noise_band(figure, noise, row=2, col=1)
+    traces = [draw(measured[1], measured[0], INK, 0)]
+    figure.add_scatter(**traces[0], row=1, col=1)
+    words = ("",) if len(models) == 1 else (" before", " after")
+    for k, (word, colour, pair) in enumerate(zip(words, (RED, BLUE), models, strict=False), 1):
+        names = f"model{word}", f"model{word} less measured"
+        both = [draw(y, name, colour, k) for y, name in zip(pair, names, strict=True)]
+        figure.add_scatter(**both[0], row=1, col=1)
+        figure.add_scatter(**both[1], showlegend=False, row=2, col=1)
+        traces += both
+    noise_band(figure, noise, row=2, col=1)
     figure.update_xaxes(title=titles[0], row=2, col=1)
     figure.update_yaxes(title=titles[1], row=1, col=1)
     figure.update_yaxes(title=f"difference<br>[{unit}]", row=2, col=1)
-    return styled_figure(figure, 520, legend=above(1.1))
+    styled_figure(figure, 520, legend=above(1.1))
+    data = {f"{trace['name']} [{unit}]": trace["y"] for trace in traces}
+    return Plot.of(*said, figure, {titles[0]: traces[0]["x"], **data}, 5)
+
+
+def fall(rms: Sequence[float], unit: str, noise: float) -> str:
+    """Say the rms difference of a model, or those of the models before and after a change."""
+    said = [f"{value:.3g}" for value in rms]
+    known = f", {rms[-1] / noise:.1f} noise" if np.isfinite(noise) else ""
+    was = f"was {said[0]} and is now" if len(rms) > 1 else "is"
+    return f"The difference {was} {said[-1]} {unit} rms{known}."
 
 
 def heat(
@@ -196,11 +219,33 @@ def heat(
     return styled_figure(figure, height)
 
 
-def turn_map(z: FloatArray, unit: str, height: int, **more: Any) -> go.Figure:
-    """Return a `heat` over the whole turn of the wheel, `GRID`."""
-    more.setdefault("hovertemplate", "%{x:.0f} deg: %{z:.3g} " + unit + "<extra></extra>")
-    figure = heat(z, DEGREES, ANGLE_TITLE, unit, height, digits=2, **more)
-    return figure.update_xaxes(range=[-180, 180], dtick=30)
+def turn_map(
+    said: Said,
+    z: FloatArray,
+    labels: Sequence[str],
+    marks: tuple[Sequence[float], Sequence[str], str],
+    unit: str,
+    height: int,
+    limit: float | None = None,
+) -> Plot:
+    """Return a `heat` over the whole turn of the wheel, `GRID`.
+
+    Parameters
+    ----------
+    labels : sequence of str
+        Of the rows: in the data and, where they are few, under the pointer.
+    marks : (places, texts, title)
+        Ticks of the rows, and what they are.
+    """
+    hover: dict[str, Any] = {"hovertemplate": f"%{{x:.0f}} deg: %{{z:.3g}} {unit}<extra></extra>"}
+    if len(labels) <= MOST_NAMED_ROWS:
+        text = np.broadcast_to(np.array(labels, dtype=object)[:, None], z.shape)
+        hover = {"text": text, "hovertemplate": f"%{{text}}<br>{hover['hovertemplate']}"}
+    figure = heat(z, DEGREES, ANGLE_TITLE, unit, height, limit, digits=2, **hover)
+    figure.update_xaxes(range=[-180, 180], dtick=30)
+    ticks(figure, *marks)
+    columns = zip((f"{label} [{unit}]" for label in labels), z, strict=True)
+    return Plot.of(*said, figure, [("wheel angle [deg]", DEGREES), *columns], 4)
 
 
 def ticks(
@@ -212,65 +257,117 @@ def ticks(
         figure.update_yaxes(title={"text": title, "standoff": 12})
 
 
-def level_means(
-    values: FloatArray, level: IntArray, count: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return mean, half of the 95 % confidence interval and number of the values of each level.
+def cell_means(
+    values: FloatArray, row: IntArray, column: IntArray, shape: tuple[int, int]
+) -> FloatArray:
+    """Return the mean of the values in each cell of a map; NaN where there are none.
 
-    Parameters
-    ----------
-    values : shape (n,)
-        NaN does not count.
-    level : shape (n,)
-        From 0 to count - 1; others belong to none.
-
-    Returns
-    -------
-    centre, half, number : shape (count,)
-        NaN where there are no values; the half as well where there is one.
+    A value belongs to no cell where its row or its column is below zero.
     """
-    centre, half, number = np.full((3, count), np.nan)
+    inside = (row >= 0) & (column >= 0)
+    place = np.ravel_multi_index((row[inside], column[inside]), shape)
+    total, count = (
+        np.bincount(place, weights, minlength=shape[0] * shape[1]).reshape(shape)
+        for weights in (values[inside], None)
+    )
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _level_means(values: FloatArray, level: IntArray, count: int) -> FloatArray:
+    """Return number, mean and half of the 95 % confidence interval of each level, (3, count).
+
+    NaN where there are no values; the half as well where there is one. A value that is NaN does
+    not count.
+    """
+    number, mean, half = np.full((3, count), np.nan)
     for k in range(count):
         part = values[(level == k) & np.isfinite(values)]
         number[k] = part.size
         if part.size:
-            centre[k] = part.mean()
+            mean[k] = part.mean()
         if part.size > 1:
-            error = part.std(ddof=1) / np.sqrt(part.size)
-            half[k] = error * stdtrit(part.size - 1, 0.975)
-    return centre, half, number
+            half[k] = part.std(ddof=1) / np.sqrt(part.size) * stdtrit(part.size - 1, 0.975)
+    return np.stack([number, mean, half])
 
 
-def confidence(
-    figure: go.Figure, x: FloatArray, centre: FloatArray, half: FloatArray, of: str, **place: Any
-) -> None:
-    """Draw means with a band of 95 % confidence where it is known.
+def trend(
+    said: Said,
+    label: str,
+    x: FloatArray,
+    level: IntArray,
+    panels: Mapping[str, FloatArray],
+    what: tuple[str, str],
+    of: str,
+) -> Plot:
+    """Return means over the levels of a condition, with bands of 95 % confidence.
 
     Parameters
     ----------
-    x, centre, half : shape (n,)
-        Half the width of the band; NaN where it is unknown.
+    label : str
+        Axis of the condition.
+    x : shape (n_levels,)
+        The condition at each level.
+    level : shape (n,)
+        Level of each value, from 0; others belong to none.
+    panels : mapping of str to shape (n,)
+        Values of each panel, three of which stand in a row; the only one needs no name.
+    what : (text, unit)
+        What the values are.
     of : str
         What the means are over.
-    place
-        Panel and legend, as plotly's `add_scatter` takes them.
     """
+    named, unit = len(panels) > 1, f"[{what[1]}]"
+    rows, columns = (-(-len(panels) // 3), 3) if named else (1, 1)
+    figure = make_subplots(
+        rows=rows,
+        cols=columns,
+        subplot_titles=[name.capitalize() for name in panels] if named else None,
+        shared_xaxes=True,
+        vertical_spacing=0.14,
+        horizontal_spacing=0.07,
+    )
+    names = [label, of, f"{what[0]} {unit}", f"95 % half-width {unit}"]
+    data: dict[str, Any] = {"panel": []} if named else {}
+    parts = []
+    for k, (name, values) in enumerate(panels.items()):
+        where = {"row": k // columns + 1, "col": k % columns + 1}
+        number, mean, half = _level_means(values, level, x.size)
+        _band(figure, x, mean, half, of, showlegend=k == 0, **where)
+        level_line(figure, **where)
+        parts.append(np.round([x, number, mean, half], 5))
+        if named:
+            data["panel"] += [name] * x.size
+    figure.update_xaxes(title=label, row=rows)
+    figure.update_yaxes(title=f"{what[0]}{'<br>' if named else ' '}{unit}", col=1)
+    styled_figure(figure, 560 if named else 380, legend=above(1.16 if named else 1.12))
+    if named:
+        figure.update_layout(margin={"t": 75})
+        figure.update_xaxes(tickvals=x)
+    data |= zip(names, np.concatenate(parts, axis=1), strict=True)
+    return Plot.of(*said, figure, data)
+
+
+def _band(
+    figure: go.Figure, x: FloatArray, mean: FloatArray, half: FloatArray, of: str, **place: Any
+) -> None:
+    """Draw means with their band in a panel."""
     known = np.isfinite(half)
-    if known.any():
-        figure.add_scatter(
-            x=np.concatenate([x[known], x[known][::-1]]),
-            y=np.concatenate([(centre + half)[known], (centre - half)[known][::-1]]),
-            fill="toself",
-            mode="lines",
-            fillcolor="rgba(0,114,178,0.22)",
-            line={"width": 0},
-            hoverinfo="skip",
-            name="95 % confidence",
-            legendgroup="band",
-            **place,
-        )
-    mean = line(x, np.round(centre, 4), f"mean over the {of}", BLUE) | {"mode": "lines+markers"}
-    figure.add_scatter(**mean, legendgroup="mean", **place)
+    at, low, high = x[known], (mean - half)[known], (mean + half)[known]
+    figure.add_scatter(
+        x=np.concatenate([at, at[::-1]]),
+        y=np.concatenate([high, low[::-1]]),
+        fill="toself",
+        mode="lines",
+        fillcolor="rgba(0,114,178,0.22)",
+        line={"width": 0},
+        hoverinfo="skip",
+        name="95 % confidence",
+        legendgroup="band",
+        visible=bool(known.any()),
+        **place,
+    )
+    means = line(x, np.round(mean, 4), f"mean over the {of}", BLUE) | {"mode": "lines+markers"}
+    figure.add_scatter(**means, legendgroup="mean", **place)
 
 
 def noise_band(figure: go.Figure, noise: float, **place: int) -> None:

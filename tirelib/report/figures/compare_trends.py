@@ -6,24 +6,21 @@ from plotly.subplots import make_subplots
 
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.quantities import QUANTITIES
-from tirelib.inference.compare.document import edge_value
 from tirelib.inference.compare.runs import Factor
 from tirelib.inference.compare.sectors import SECTORS
 from tirelib.inference.compare.sentences import told
-from tirelib.inference.compare.set_points import NAMES
+from tirelib.inference.compare.set_points import SAID
 from tirelib.inference.compare.strain import Comparison
 from tirelib.inference.compare.tracks import Track
-from tirelib.report.figures.compare_heat import NAMES as CONDITIONS
 from tirelib.report.figures.compare_plot import (
     SYMBOLS,
     Plot,
     above,
-    confidence,
     dots,
     level_line,
-    level_means,
     line,
     styled_figure,
+    trend,
 )
 from tirelib.report.style import BLACK, BLUE, CATEGORIES, GREEN, RED
 
@@ -48,52 +45,28 @@ def trend_plots(found: Comparison) -> list[Plot]:
 
 def run_means(found: Comparison) -> FloatArray:
     """Return the mean difference of each run in each sector, (n_runs, n_sectors), [-]."""
-    out = []
-    for number in range(len(SECTORS)):
-        inside = found.sector == number
-        count = np.maximum(inside.sum(axis=1), 1)
-        mean = np.sum(np.where(inside, found.difference, 0.0), axis=1) / count
-        out.append(np.where(inside.any(axis=1), mean, np.nan))
-    return np.stack(out, axis=1)
+    inside = found.sector[:, None] == np.arange(len(SECTORS))[:, None]
+    count = inside.sum(axis=2)
+    total = np.sum(np.where(inside, found.difference[:, None], 0.0), axis=2)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _trend(found: Comparison, factor: Factor) -> Plot:
-    means = 1e6 * run_means(found)
-    unit = QUANTITIES[factor.name].words
-    x = np.array([edge_value(factor.name, float(v)) for v in factor.values])
-    figure = make_subplots(
-        rows=2,
-        cols=3,
-        subplot_titles=[s.capitalize() for s in SECTORS],
-        shared_xaxes=True,
-        vertical_spacing=0.14,
-        horizontal_spacing=0.07,
-    )
-    sector, levels = [], []
-    for number, name in enumerate(SECTORS):
-        centre, half, _ = level_means(means[:, number], factor.level, factor.values.size)
-        where = {"row": number // 3 + 1, "col": number % 3 + 1}
-        confidence(figure, x, centre, half, "runs", showlegend=number == 0, **where)
-        level_line(figure, **where)
-        sector += [name] * x.size
-        levels.append(np.stack([x, np.round(centre, 3), np.round(half, 3)]))
-    label = f"{CONDITIONS[factor.name]}{f' [{unit}]' if unit else ''}"
-    for column in (1, 2, 3):
-        figure.update_xaxes(title=label, row=2, col=column)
-    figure.update_xaxes(tickvals=x)
-    for row in (1, 2):
-        figure.update_yaxes(title="model less measured<br>[microstrain]", row=row, col=1)
-    styled_figure(figure, 560, legend=above(1.16))
-    figure.update_layout(margin={"t": 75})
-    names = [label, "model less measured [microstrain]", "95 % half-width [microstrain]"]
-    return Plot.of(
-        f"trend-{factor.name.replace('_', '-')}",
-        f"Mean difference by {CONDITIONS[factor.name]}",
-        "Each panel is a sector of the wheel turn. The band is the 95 % confidence interval of the "
-        "level's mean, from the scatter of its runs over the other conditions; levels of one run "
-        "have none. Above zero the model shows too much tension.",
-        figure,
-        {"sector": sector, **dict(zip(names, np.concatenate(levels, axis=1), strict=True))},
+    quantity = QUANTITIES[factor.name]
+    return trend(
+        (
+            f"trend-{factor.name.replace('_', '-')}",
+            f"Mean difference by {quantity.title}",
+            "Each panel is a sector of the wheel turn. The band is the 95 % confidence interval of "
+            "the level's mean, from the scatter of its runs over the other conditions; levels of "
+            "one run have none. Above zero the model shows too much tension.",
+        ),
+        quantity.heading,
+        np.asarray(quantity.told(factor.values)),
+        factor.level,
+        dict(zip(SECTORS, 1e6 * run_means(found).T, strict=True)),
+        ("model less measured", "microstrain"),
+        "runs",
     )
 
 
@@ -165,8 +138,11 @@ def set_point_plot(found: Comparison) -> Plot:
     order = np.argsort(found.chosen.waves.start, kind="stable")
     run, scaled, value = found.run[order], found.points.scaled[order], found.points.value[order]
     figure, place = go.Figure(), np.arange(1, len(order) + 1)
-    for k, (name, colour) in enumerate(zip(NAMES, (BLUE, RED, BLACK, GREEN), strict=True)):
-        text = "angle zero" if name == "angle" else name
+    data: dict[str, FloatArray] = {}
+    for k, ((text, unit, factor), colour) in enumerate(
+        zip(SAID.values(), (BLUE, RED, BLACK, GREEN), strict=True)
+    ):
+        data |= {f"{text} [tolerance]": scaled[:, k], f"{text} [{unit}]": factor * value[:, k]}
         trace = dots(place, np.round(scaled[:, k], 3), text, colour, symbol=SYMBOLS[k])
         figure.add_scatter(**trace, customdata=run, hovertemplate=_HOVER)
     for y in (-1.96, 1.96):
@@ -174,16 +150,12 @@ def set_point_plot(found: Comparison) -> Plot:
     figure.update_xaxes(title="place of the run in the campaign")
     figure.update_yaxes(title="beside the recorded value [tolerance]")
     styled_figure(figure, 380, legend=above())
-    units = {"load [%]": 100, "pressure [%]": 100, "gain [%]": 100, "angle zero [mrad]": 1000}
     return Plot.of(
         "set-points",
         "What was taken out as set-point error",
         "Best linear prediction per run; 95 % should lie between the dotted lines. Many beyond "
         "them, or a trend, is misfit that looks like a set-point error.",
         figure,
-        {
-            "run": run,
-            **{f"{name} [tolerance]": np.round(scaled[:, k], 4) for k, name in enumerate(NAMES)},
-            **{name: np.round(f * value[:, k], 5) for k, (name, f) in enumerate(units.items())},
-        },
+        {"run": run, **data},
+        5,
     )

@@ -12,6 +12,7 @@ from tirelib.core.errors import CalibrationError
 from tirelib.estimators.cornering import CorneringTrend, magic_formula
 from tirelib.estimators.dissertation import Means
 from tirelib.inference.compare.sentences import millimetres
+from tirelib.report.figures.regression import scatter_levels
 from tirelib.report.levels import angle_levels, load_levels, reference_level, upright
 from tirelib.report.style import (
     CATEGORIES,
@@ -50,22 +51,11 @@ def figure_4_20(means: Means, trend: CorneringTrend) -> Figure:
     axes = figure.subplots()
     levels = load_levels(np.where(upright(means), means.load, np.nan))
     grid = np.linspace(float(means.slip_angle.min()), float(means.slip_angle.max()), 300)
-    for i, (level, colour) in enumerate(zip(levels, sequence(len(levels)), strict=True)):
+    scatter_levels(axes, means.slip_angle, means.lateral_force, levels)
+    for level, colour in zip(levels, sequence(len(levels)), strict=True):
         angle, force = means.slip_angle[level.rows], means.lateral_force[level.rows]
         near = int(np.argmin(np.abs(trend.load - level.value)))
-        fitted = abs(trend.load[near] - level.value) < 0.1 * float(means.load.mean())
-        axes.scatter(
-            angle,
-            force,
-            s=28,
-            marker=MARKERS[i % 10],
-            color=colour,
-            edgecolors="white",
-            linewidths=0.4,
-            zorder=3,
-            label=f"measured, {level.text}",
-        )
-        if not fitted:
+        if abs(trend.load[near] - level.value) >= 0.1 * float(means.load.mean()):
             continue
         stiffness, peak = float(trend.stiffness[near]), float(trend.peak[near])
         bend = bend_factor(angle, -force, stiffness, peak)
@@ -74,7 +64,9 @@ def figure_4_20(means: Means, trend: CorneringTrend) -> Figure:
     axes.plot([], [], color=FAINT, label="Magic Formula")
     zero_line(axes)
     axes.axvline(0.0, color=FAINT, linewidth=0.9, zorder=1.5)
-    axes.set_title("Cornering curves: a positive slip angle gives a negative lateral force")
+    axes.set_title(
+        "Cornering curves, measured: a positive slip angle gives a negative lateral force"
+    )
     axes.set_xlabel(label("measured slip angle", "deg", signed=True))
     axes.set_ylabel(label("measured lateral force Fy", "N", signed=True))
     legend_below(figure, [axes], columns=6)

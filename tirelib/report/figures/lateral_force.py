@@ -11,10 +11,10 @@ from tirelib.estimators.train import Trained
 from tirelib.report.figures.regression import (
     RESIDUAL,
     in_use,
+    known_rms,
     largest,
     needed_regression,
     residual_panel,
-    rms,
     scatter_levels,
 )
 from tirelib.report.levels import Level, camber_levels, load_levels
@@ -64,7 +64,7 @@ class _Columns:
         scatter_levels(lower, measured, error, levels, rows, colours)
         lower.set_xlabel("measured " + FORCE)
         self.errors.append(error)
-        return rms(error)
+        return known_rms(error)
 
     def finished(self) -> Figure:
         """Return the figure with its labels and its legend."""

@@ -1,5 +1,7 @@
 """Maps of what a diagnosed model leaves: of strain over the turn, of a force over its slip."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from tirelib.core.arrays import FloatArray, IntArray
@@ -9,7 +11,14 @@ from tirelib.inference.diagnose.forces.models import ForceFit
 from tirelib.inference.diagnose.left import Left, left_of
 from tirelib.inference.identify.error_bands import levels
 from tirelib.inference.problems.force_plan import varies
-from tirelib.report.figures.compare_plot import DEGREES, Plot, heat, limit_of, ticks, turn_map
+from tirelib.report.figures.compare_plot import (
+    Plot,
+    cell_means,
+    heat,
+    limit_of,
+    ticks,
+    turn_map,
+)
 from tirelib.report.page import unit_name
 
 DIGITS = {"load": ",.0f", "pressure": ".2f", "camber": ".1f", "speed": ".0f"}
@@ -17,44 +26,46 @@ DIGITS = {"load": ",.0f", "pressure": ".2f", "camber": ".1f", "speed": ".0f"}
 _BINS = 24
 
 
-def strain_maps(found: Assessment) -> list[Plot]:
+def maps(found: Assessment | ForceAssessment) -> list[Plot]:
     """Return the map without the named effects and, where there are some, with them."""
-    before = left_of(found.refitted, found.diagnosis.problem.data.points)
-    maps = [_turns(found, before, "before", "Without the named effects")]
+    titles = ["Without the named effects"]
     if found.named:
-        maps.append(_turns(found, found.left, "after", f"With {', '.join(found.named)}"))
-    return maps
+        titles.append(f"With {', '.join(found.named)}")
+    if isinstance(found, ForceAssessment):
+        fits = (found.diagnosis.base, found.final)
+        drawn = [_slips(found, fit, title) for fit, title in zip(fits, titles, strict=False)]
+    else:
+        first = left_of(found.refitted, found.diagnosis.problem.data.points)
+        pairs = zip((first, found.left), titles, strict=False)
+        drawn = [_turns(found, left, title) for left, title in pairs]
+    names = ("residual-before", "residual-after")
+    return [replace(plot, name=name) for plot, name in zip(drawn, names, strict=False)]
 
 
-def _turns(found: Assessment, left: Left, name: str, title: str) -> Plot:
+def _turns(found: Assessment, left: Left, title: str) -> Plot:
     points, run = found.diagnosis.problem.data.points, found.diagnosis.runs.waves.run
     order = np.lexsort((points.speed, points.pressure, np.round(points.load, -2)))
     data, unit = left.white[order], unit_name(found.after.unit)
     labels = [f"run {run[k]}: {points.load[k]:.0f} N" for k in order]
-    figure = turn_map(data, unit, 480, limit=limit_of(found.refitted.white_of(found.refitted.rest)))
     marks = range(0, len(order), max(1, len(order) // 10))
-    ticks(figure, marks, [labels[k] for k in marks], "runs, by load [N]")
-    columns = zip((f"{label} [{unit}]" for label in labels), data, strict=True)
-    return Plot.of(
-        f"residual-{name}",
-        title,
-        "Model minus measurement, with set-point errors weighted down as in the fit. One colour "
-        "scale for both maps. Red: the model shows too much tension; blue: too much compression.",
-        figure,
-        [("wheel angle [deg]", DEGREES), *columns],
-        3,
+    return turn_map(
+        (
+            "residual",
+            title,
+            "Model minus measurement, with set-point errors weighted down as in the fit. One "
+            "colour scale for both maps. Red: the model shows too much tension; blue: too much "
+            "compression.",
+        ),
+        data,
+        labels,
+        (marks, [labels[k] for k in marks], "runs, by load [N]"),
+        unit,
+        480,
+        limit_of(found.refitted.white_of(found.refitted.rest)),
     )
 
 
-def force_maps(found: ForceAssessment) -> list[Plot]:
-    """Return the map without the named effects and, where there are some, with them."""
-    maps = [_slips(found, found.diagnosis.base, "before", "Without the named effects")]
-    if found.named:
-        maps.append(_slips(found, found.final, "after", f"With {', '.join(found.named)}"))
-    return maps
-
-
-def _slips(assessment: ForceAssessment, model: ForceFit, name: str, title: str) -> Plot:
+def _slips(assessment: ForceAssessment, model: ForceFit, title: str) -> Plot:
     """Return the mean of model less measured by slip and by set point of the other conditions."""
     case = assessment.case
     at, unit = case.bench.conditions, case.unit
@@ -64,8 +75,9 @@ def _slips(assessment: ForceAssessment, model: ForceFit, name: str, title: str) 
     edges = np.linspace(slip.min(), slip.max() + 1e-9, _BINS + 1)
     middle, column = 0.5 * (edges[1:] + edges[:-1]), np.digitize(slip, edges) - 1
     labels, group = _rows(assessment)
+    column = np.clip(column, 0, _BINS - 1)
     cells, first = (
-        _means(-case.factor * fit.rest, column, group, len(labels))
+        cell_means(-case.factor * fit.rest, group, column, (len(labels), _BINS))
         for fit in (model, assessment.diagnosis.base)
     )
     figure = heat(
@@ -82,7 +94,7 @@ def _slips(assessment: ForceAssessment, model: ForceFit, name: str, title: str) 
     ticks(figure, marks, [labels[k] for k in marks])
     columns = zip((f"{x:.4g} {words}" for x in middle), np.round(cells, 4).T, strict=True)
     return Plot.of(
-        f"residual-{name}",
+        "residual",
         title,
         "Mean of model less measured; one colour scale for both maps. White: none, or not "
         "measured.",
@@ -113,12 +125,3 @@ def _rows(assessment: ForceAssessment) -> tuple[list[str], IntArray]:
         for k in range(int(group.max()) + 1)
     ]
     return [", ".join(parts) for parts in said], group
-
-
-def _means(data: FloatArray, column: IntArray, group: IntArray, rows: int) -> FloatArray:
-    place = group * _BINS + np.clip(column, 0, _BINS - 1)
-    count = np.bincount(place, minlength=rows * _BINS)
-    total = np.bincount(place, data, minlength=rows * _BINS)
-    with np.errstate(invalid="ignore"):
-        mean: FloatArray = (total / np.where(count > 0, count, np.nan)).reshape(rows, _BINS)
-    return mean

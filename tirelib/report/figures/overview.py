@@ -1,6 +1,5 @@
 """Estimates against measurements: by quantity, turn by turn (Fig. 4-8), and their residuals."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,9 +15,7 @@ from tirelib.estimators.train import Trained
 from tirelib.measured.observations import Observations
 from tirelib.report.accuracy import (
     QUANTITIES,
-    SIGNED,
-    TITLE,
-    UNIT,
+    SAID,
     WIDTH,
     Compared,
     accuracy,
@@ -29,9 +26,9 @@ from tirelib.report.figures.regression import (
     RESIDUAL,
     find_regression,
     in_use,
+    known_rms,
     largest,
     residual_panel,
-    rms,
     scatter_levels,
 )
 from tirelib.report.levels import load_levels
@@ -67,7 +64,7 @@ def figure_accuracy(observations: Observations, estimates: Estimates) -> Figure:
 
 def _column(part: Compared, upper: Axes, lower: Axes) -> None:
     row = accuracy(part)
-    name, unit, signed = TITLE[part.quantity], UNIT[part.quantity], part.quantity in SIGNED
+    name, _, unit, signed = SAID[part.quantity]
     levels = load_levels(part.load)
     error = part.measured - part.estimated
     for i, (level, colour) in enumerate(zip(levels, sequence(len(levels)), strict=True)):
@@ -116,7 +113,7 @@ def figure_4_8(observations: Observations, estimates: Estimates) -> Figure:
         upper.text(
             start + 0.5 * rows.size,
             1.02,
-            f"{level.text}: rms {rms(error):.2f} deg",
+            f"{level.text}: rms {known_rms(error):.2f} deg",
             transform=upper.get_xaxis_transform(),
             ha="center",
             va="bottom",
@@ -154,53 +151,37 @@ def figure_residuals(trained: Trained, quantity: str) -> Figure:
         raise CalibrationError(f"residuals of {quantity}: it is not calibrated: {reason}")
     measured, estimated = held
     truth = trained.links.truth
-    rows = [
-        _Residuals(
-            "in use, held out",
-            estimated,
-            truth["Fz"],
-            np.rad2deg(truth["slip_angle"]),
-            measured - estimated,
-        )
-    ]
+    angle, error = np.rad2deg(truth["slip_angle"]), measured - estimated
+    rows = [("in use, held out", estimated, truth["Fz"], angle, error)]
     old = find_regression(trained, DISSERTATION.get(quantity, ""))
     if old is not None:
-        means, use = trained.means, old.rows
-        rows.append(
-            _Residuals(
-                f"dissertation, {old.source}",
-                old.fitted,
-                means.load[use],
-                means.slip_angle[use],
-                old.measured - old.fitted,
-            )
-        )
+        load, angle = trained.means.load[old.rows], trained.means.slip_angle[old.rows]
+        name = f"dissertation, {old.source}"
+        rows.append((name, old.fitted, load, angle, old.measured - old.fitted))
     figure = new_figure(13.0, 0.7 + 3.5 * len(rows))
     grid = figure.subplots(len(rows), 4, width_ratios=(1, 1, 1, 0.9), squeeze=False)
     for panels, row in zip(grid, rows, strict=True):
-        _draw_residuals(list(panels), row, quantity)
+        _draw_residuals(list(panels), quantity, *row)
     legend_below(figure, [grid[0, 0]], columns=7)
     return figure
 
 
-@dataclass(frozen=True, slots=True)
-class _Residuals:
-    """One row of the figure; arrays of shape (n,), as drawn."""
-
-    name: str
-    estimated: FloatArray
-    load: FloatArray
-    angle: FloatArray
-    error: FloatArray
-
-
-def _draw_residuals(panels: list[Axes], row: _Residuals, quantity: str) -> None:
-    unit, name, error = UNIT[quantity], TITLE[quantity], row.error
-    levels = load_levels(row.load)
+def _draw_residuals(
+    panels: list[Axes],
+    quantity: str,
+    what: str,
+    estimated: FloatArray,
+    load: FloatArray,
+    angle: FloatArray,
+    error: FloatArray,
+) -> None:
+    """Draw a row of the figure: residuals over the estimate, the load and the slip angle."""
+    unit, name = SAID[quantity].unit, SAID[quantity].title
+    levels = load_levels(load)
     across = (
-        (row.estimated, label(f"estimated {name}", unit, signed=quantity in SIGNED)),
-        (row.load, label("measured vertical load Fz", "N")),
-        (row.angle, label("measured slip angle", "deg", signed=True)),
+        (estimated, f"estimated {SAID[quantity].label}"),
+        (load, label("measured vertical load Fz", "N")),
+        (angle, label("measured slip angle", "deg", signed=True)),
     )
     for axes, (x, text) in zip(panels, across, strict=False):
         scatter_levels(axes, x, error, levels)
@@ -216,4 +197,4 @@ def _draw_residuals(panels: list[Axes], row: _Residuals, quantity: str) -> None:
     panels[3].set_title("against a normal law")
     panels[3].set_xlabel("normal quantile [-]")
     panels[3].set_ylabel(label(RESIDUAL, unit))
-    panels[0].set_title(f"{name[0].upper()}{name[1:]}, {row.name}: rms {rms(error):.3g} {unit}")
+    panels[0].set_title(f"{name[0].upper()}{name[1:]}, {what}: rms {known_rms(error):.3g} {unit}")

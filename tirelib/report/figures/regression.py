@@ -6,11 +6,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray, r_squared, rms
 from tirelib.core.errors import CalibrationError
+from tirelib.core.quantities import Quantity
 from tirelib.estimators.dissertation import Regression
+from tirelib.estimators.result import TRUTH
 from tirelib.estimators.train import Trained
-from tirelib.report.accuracy import FACTOR, TRUTH
+from tirelib.report.accuracy import SAID
 from tirelib.report.levels import Level, load_levels, reference_level
 from tirelib.report.style import (
     MARKERS,
@@ -91,14 +93,13 @@ def in_use(trained: Trained, quantity: str) -> tuple[FloatArray, FloatArray] | N
     links = trained.links
     if quantity not in links.held_out:
         return None
-    factor = FACTOR[quantity]
-    return links.truth[TRUTH[quantity]] * factor, links.held_out[quantity] * factor
+    said = SAID[quantity]
+    return said.told(links.truth[TRUTH[quantity]]), said.told(links.held_out[quantity])
 
 
-def rms(values: FloatArray) -> float:
+def known_rms(values: FloatArray) -> float:
     """Return the root mean square of the finite values."""
-    values = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
+    return rms(values[np.isfinite(values)])
 
 
 def largest(*parts: FloatArray) -> float:
@@ -108,11 +109,8 @@ def largest(*parts: FloatArray) -> float:
     return float(every.max()) if every.size else 1.0
 
 
-@styled
 def figure_4_4(trained: Trained) -> Figure:
-    """Load against centre contact length with the quadratic, its residuals, and those in use.
-
-    Source: dissertation, Fig. 4-4.
+    """Load against centre contact length with the quadratic (dissertation, Fig. 4-4).
 
     Raises
     ------
@@ -121,76 +119,61 @@ def figure_4_4(trained: Trained) -> Figure:
     """
     found = needed_regression(trained, "Fig. 4-4", "the load", "several loads")
     b = [term.coefficient for term in found.terms]
-    name = label("vertical load Fz", "N")
-    regressor = label("contact length l of the centre gage", "mm")
-    held = in_use(trained, "Fz")
-    figure, panels = _panels(held, 4.5, (9.0, 12.5))
-    fitted = "quadratic, ordinary least squares"
-    _over(panels[0], trained, found, regressor, f"measured {name}", fitted)
-    panels[0].set_title(
-        f"Fz = {b[0]:.0f} {b[1]:+.2f} l {b[2]:+.4f} l\u00b2\nR\u00b2 = {found.r2:.4f}"
+    return _figure(
+        trained,
+        found,
+        in_use(trained, "Fz"),
+        label("contact length l of the centre gage", "mm"),
+        SAID["Fz"],
+        f"Fz = {b[0]:.0f} {b[1]:+.2f} l {b[2]:+.4f} l\u00b2\nR\u00b2 = {found.r2:.4f}",
+        "Residuals of the quadratic\nrms {:.0f} N, held out {:.0f} N",
+        "Estimator in use, held out\nrms {:.1f} N",
     )
-    said = "Residuals of the quadratic\nrms {:.0f} N, held out {:.0f} N"
-    own = "Estimator in use, held out\nrms {:.1f} N"
-    _residuals(figure, panels, trained, found, held, name, said, own)
-    return figure
 
 
-@styled
 def figure_4_5(trained: Trained) -> Figure:
-    """Slip angle against the in/out ratio of the rate peaks with the quadratic and its residuals.
-
-    Source: dissertation, Fig. 4-5.
-
-    Raises
-    ------
-    CalibrationError
-        If the campaign did not vary the slip angle.
-    """
+    """Slip angle against the in/out ratio of the rate peaks (dissertation, Fig. 4-5)."""
     regressor = label("in/out ratio of peak strain rates", "-", signed=True)
     return _of_angle(trained, "Fig. 4-5", regressor, None)
 
 
-@styled
 def figure_4_7(trained: Trained) -> Figure:
-    """Slip angle against the slope of the peak rates, residuals, the estimator in use beside it.
-
-    Source: dissertation, Fig. 4-7.
-
-    Raises
-    ------
-    CalibrationError
-        If the campaign did not vary the slip angle.
-    """
+    """Slip angle against the slope of the peak rates (dissertation, Fig. 4-7)."""
     regressor = label("slope of peak strain rates", "1/(rad m)", signed=True)
     return _of_angle(trained, "Fig. 4-7", regressor, in_use(trained, "alpha"))
 
 
 def _of_angle(trained: Trained, source: str, regressor: str, held: _InUse) -> Figure:
-    """Draw a regression of the slip angle; thin lines are fits to one load each."""
+    """Draw a regression of the slip angle; thin lines are fits to one load each.
+
+    Raises
+    ------
+    CalibrationError
+        If the campaign did not vary the slip angle.
+    """
     found = needed_regression(trained, source, "the slip angle", "slip angles")
-    levels, rows = load_levels(trained.means.load), found.rows
-    x, measured, degree = found.regressor, found.measured, len(found.terms) - 1
-    figure, panels = _panels(held, 4.6, (9.5, 12.5))
-    _over(panels[0], trained, found, regressor, f"measured {ANGLE}", "fit over all loads")
-    for level, colour in zip(levels, sequence(len(levels)), strict=True):
-        here = level.rows[rows]
-        if here.sum() > degree + 2:
-            ends = np.linspace(float(x[here].min()), float(x[here].max()), 60)
-            own = _FIT.polyval(ends, _FIT.polyfit(x[here], measured[here], degree))
-            panels[0].plot(ends, own, color=colour, linewidth=0.9, zorder=2)
-    reference = reference_level(levels)
-    panels[0].set_title(
+    levels, measured = load_levels(trained.means.load), found.measured
+    reference, degree = reference_level(levels), len(found.terms) - 1
+    figure = _figure(
+        trained,
+        found,
+        held,
+        regressor,
+        SAID["alpha"],
         f"All loads R\u00b2 = {found.r2:.3f}; {reference.text} alone "
-        f"R\u00b2 = {_alone(found, reference.rows[rows], degree):.3f}"
+        f"R\u00b2 = {_alone(found, reference.rows[found.rows], degree):.3f}",
+        "Residuals: rms {:.2f} deg, held out {:.2f} deg",
+        "Estimator in use, held out: rms {:.3f} deg",
+        float(np.abs(measured).max()) + 0.5,
     )
-    low, high = float(measured.min()), float(measured.max())
-    room = 0.35 * (high - low)
-    panels[0].set_ylim(low - room, high + room)
-    said = "Residuals: rms {:.2f} deg, held out {:.2f} deg"
-    own_words = "Estimator in use, held out: rms {:.3f} deg"
-    most = float(np.abs(measured).max()) + 0.5
-    _residuals(figure, panels, trained, found, held, ANGLE, said, own_words, most, signed=True)
+    axes, room = figure.axes[0], 0.35 * float(np.ptp(measured))
+    for level, colour in zip(levels, sequence(len(levels)), strict=True):
+        x, y = (values[level.rows[found.rows]] for values in (found.regressor, measured))
+        if x.size > degree + 2:
+            ends = np.linspace(float(x.min()), float(x.max()), 60)
+            own = _FIT.polyval(ends, _FIT.polyfit(x, y, degree))
+            axes.plot(ends, own, color=colour, linewidth=0.9, zorder=2)
+    axes.set_ylim(float(measured.min()) - room, float(measured.max()) + room)
     return figure
 
 
@@ -199,60 +182,54 @@ def _alone(regression: Regression, rows: BoolArray, degree: int) -> float:
     x, y = regression.regressor[rows], regression.measured[rows]
     if x.size <= degree + 1:
         return float("nan")
-    rest = y - _FIT.polyval(x, _FIT.polyfit(x, y, degree))
-    return 1.0 - float(np.sum(rest**2) / np.sum((y - y.mean()) ** 2))
+    return r_squared(y, y - _FIT.polyval(x, _FIT.polyfit(x, y, degree)))
 
 
-def _panels(held: _InUse, height: float, widths: tuple[float, float]) -> tuple[Figure, list[Axes]]:
-    """Return a figure with room for the regression, its residuals and, third, those in use."""
-    figure = new_figure(widths[1] if held else widths[0], height)
-    return figure, list(figure.subplots(1, 3 if held else 2))
-
-
-def _over(
-    axes: Axes, trained: Trained, found: Regression, regressor: str, measured: str, curve: str
-) -> None:
-    """Draw what was measured over the regressor, and the fitted polynomial."""
-    x, levels = found.regressor, load_levels(trained.means.load)
-    scatter_levels(axes, x, found.measured, levels, found.rows)
-    grid = np.linspace(float(x.min()), float(x.max()), 200)
-    fitted = _FIT.polyval(grid, [term.coefficient for term in found.terms])
-    axes.plot(grid, fitted, color="#333333", linewidth=1.6, zorder=4, label=curve)
-    axes.set_xlabel(regressor)
-    axes.set_ylabel(measured)
-
-
-def _residuals(
-    figure: Figure,
-    panels: Sequence[Axes],
+@styled
+def _figure(
     trained: Trained,
     found: Regression,
     held: _InUse,
-    name: str,
-    said: str,
-    own: str,
+    regressor: str,
+    said: Quantity,
+    title: str,
+    rest_title: str,
+    own_title: str,
     most: float = np.inf,
-    *,
-    signed: bool = False,
-) -> None:
-    """Draw the residuals of the regression and, up to a magnitude, of the estimator in use.
+) -> Figure:
+    """Draw a polynomial in one regressor, its residuals, and those of the estimator in use.
 
-    `said` and `own` are the titles of the two panels, with room for their rms.
+    The titles of the residuals have room for their rms; those in use are drawn up to a magnitude
+    `most` of the measured value.
     """
-    rest = found.measured - found.fitted
-    half, levels = largest(rest), load_levels(trained.means.load)
-    scatter_levels(panels[1], found.fitted, rest, levels, found.rows)
-    panels[1].set_title(said.format(rms(rest), found.cross_validated))
+    figure = new_figure(12.5 if held else 9.5, 4.6)
+    over, *panels = figure.subplots(1, 3 if held else 2)
+    x, levels, rest = (
+        found.regressor,
+        load_levels(trained.means.load),
+        found.measured - found.fitted,
+    )
+    scatter_levels(over, x, found.measured, levels, found.rows)
+    grid = np.linspace(float(x.min()), float(x.max()), 200)
+    fitted = _FIT.polyval(grid, [term.coefficient for term in found.terms])
+    curve = {"linewidth": 1.6, "zorder": 4, "label": "ordinary least squares, all loads"}
+    over.plot(grid, fitted, color="#333333", **curve)
+    over.set(xlabel=regressor, ylabel=f"measured {said.label}", title=title)
+    scatter_levels(panels[0], found.fitted, rest, levels, found.rows)
+    panels[0].set_title(rest_title.format(known_rms(rest), found.cross_validated))
+    half = largest(rest)
     if held is not None:
         measured, estimated = held
         rows = np.abs(measured) <= most
         error = (measured - estimated)[rows]
-        own_levels = load_levels(trained.links.truth["Fz"])
-        scatter_levels(panels[2], estimated[rows], error, own_levels, rows)
-        panels[2].set_title(own.format(rms(error)))
+        scatter_levels(
+            panels[1], estimated[rows], error, load_levels(trained.links.truth["Fz"]), rows
+        )
+        panels[1].set_title(own_title.format(known_rms(error)))
         half = largest(rest, error)
-    for axes in panels[1:]:
+    for axes in panels:
         residual_panel(axes, half)
-        axes.set_xlabel(f"estimated {name}")
-        axes.set_ylabel(label(RESIDUAL, found.unit, signed=signed))
-    legend_below(figure, panels[:1], columns=7)
+        axes.set_xlabel(f"estimated {said.label}")
+        axes.set_ylabel(label(RESIDUAL, said.unit, signed=said.signed))
+    legend_below(figure, [over], columns=7)
+    return figure

@@ -13,7 +13,6 @@ from tirelib.report.simulation import MICRO, Simulation
 from tirelib.report.style import (
     BLACK,
     FAINT,
-    INK,
     label,
     legend_below,
     new_figure,
@@ -76,17 +75,11 @@ def draw(
         phi, values = curve(done, quantity, point)
         shown = np.abs(phi) <= within
         axes.plot(np.rad2deg(phi[shown]), values[shown], line, color=colour, label=text)
-        if edges:
-            mark_edges(axes, done, point, colour)
+        for edge in np.rad2deg(done.edges[point]) if edges else ():
+            axes.axvline(edge, color=colour, linewidth=0.9, linestyle=":", zorder=1.4)
     zero_line(axes)
     axes.set_xlim(-np.rad2deg(within), np.rad2deg(within))
     axes.set_ylabel(quantity.label)
-
-
-def mark_edges(axes: Axes, done: Simulation, point: int, colour: str = INK) -> None:
-    """Draw thin vertical lines at both edges of the contact."""
-    for edge in np.rad2deg(done.edges[point]):
-        axes.axvline(edge, color=colour, linewidth=0.9, linestyle=":", zorder=1.4)
 
 
 def half_width(*several: Simulation) -> float:

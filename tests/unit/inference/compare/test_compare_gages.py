@@ -105,4 +105,4 @@ def test_one_gage_has_a_table_and_no_departure() -> None:
     single = compare_strain(replace(waves, header=header, strain=waves.strain[:, :1]), MODEL)
     assert len(single.gages) == 1
     assert single.gages[0].departure is None
-    assert single.gages[0].rms == pytest.approx(single.fit.rms)
+    assert single.gages[0].rms == pytest.approx(single.rms)

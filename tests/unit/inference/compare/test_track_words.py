@@ -30,9 +30,7 @@ def track(name: str, difference: np.ndarray, seed: int = 0) -> Track:
     measured = 0.02 * LOADS / 1000.0
     model = measured + difference + NOISE * rng.standard_normal(LOADS.size)
     noise, freedom = pooled(model - measured, LEVEL)
-    return Track(
-        name, "mm", 1e3, measured, model, np.zeros(LOADS.size), noise, freedom, name == "deflection"
-    )
+    return Track(name, "mm", 1e3, measured, model, np.zeros(LOADS.size), noise, freedom)
 
 
 def said(one: Track) -> tuple[str, ...]:

@@ -186,13 +186,11 @@ def test_the_fall_is_shown_by_quantity_in_one_unit() -> None:
             "floor": 2.0,
         },
     ]
-    plot = waterfall_of(history, "Fy")
-    assert plot is not None
+    (plot,) = waterfall_of(history, "Fy")
     assert [row[0] for row in plot.rows] == ["before", "1: friction_load", "2: -friction_load"]
     assert [row[1] for row in plot.rows] == [9.0, 6.0, 9.0]
     assert plot.rows[1][2] == 7.0
     assert np.isnan(plot.rows[2][2])
-    strain = waterfall_of(history, "strain")
-    assert strain is not None
+    (strain,) = waterfall_of(history, "strain")
     assert [row[1] for row in strain.rows] == [3.0, 2.0]
-    assert waterfall_of(history, "Mz") is None
+    assert waterfall_of(history, "Mz") == []
