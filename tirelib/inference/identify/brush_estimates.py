@@ -66,10 +66,8 @@ def estimates_of(study: Study, *, free_radius: float | None = None) -> tuple[Est
     out = []
     for k, (name, value) in enumerate(zip(names, fit.value.tolist(), strict=True)):
         error, spec, unit = errors[k], SPECS[name], float(slope[k])
-        low, high = value + error.low * spec.size, value + error.high * spec.size
-        if spec.log:
-            low, high = value * float(np.exp(error.low)), value * float(np.exp(error.high))
-        low, high = max(low, spec.low), min(high, spec.high)
+        low = max(spec.moved(value, error.low), spec.low)
+        high = min(spec.moved(value, error.high), spec.high)
         flags = []
         if fit.status[k] == "at boundary":
             flags.append("at_boundary")

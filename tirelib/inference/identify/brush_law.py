@@ -32,7 +32,8 @@ from tirelib.physics.brush.predict import (
 class Spec(NamedTuple):
     """A parameter: unit, allowed range, and the size by which its uncertainty is judged.
 
-    `log` parameters are fitted by their logarithm and judged by their own size.
+    `log` parameters are fitted by their logarithm and judged by their own size. Fits move a
+    coordinate z, the logarithm or the number over its size.
     """
 
     unit: str
@@ -40,6 +41,22 @@ class Spec(NamedTuple):
     high: float
     size: float
     log: bool = False
+
+    def value(self, z: FloatArray) -> FloatArray:
+        """Return the parameter at coordinates, SI."""
+        return np.asarray(np.exp(z) if self.log else z * self.size)
+
+    def z(self, value: float) -> float:
+        """Return the coordinate of the parameter."""
+        return float(np.log(value) if self.log else value / self.size)
+
+    def slope(self, value: float) -> float:
+        """Return the derivative of the parameter by its coordinate."""
+        return value if self.log else self.size
+
+    def moved(self, value: float, move: float) -> float:
+        """Return the parameter after a move of its coordinate."""
+        return value * float(np.exp(move)) if self.log else value + self.size * float(move)
 
 
 SPECS: Mapping[str, Spec] = MappingProxyType(

@@ -156,18 +156,15 @@ class BrushProblem:
 
     def values_of(self, z: FloatArray) -> FloatArray:
         """Return the parameters in SI."""
-        pairs = zip(self._specs, z, strict=True)
-        return np.array([float(np.exp(at)) if s.log else float(at * s.size) for s, at in pairs])
+        return np.array([float(s.value(at)) for s, at in zip(self._specs, z, strict=True)])
 
     def slope_of(self, z: FloatArray) -> FloatArray:
         """Return their derivative by z."""
-        pairs = zip(self._specs, self.values_of(z), strict=True)
-        return np.array([v if s.log else s.size for s, v in pairs])
+        return np.array([s.slope(v) for s, v in zip(self._specs, self.values_of(z), strict=True)])
 
     def z_of(self, value: FloatArray) -> FloatArray:
         """Return z of parameters in SI."""
-        pairs = zip(self._specs, value, strict=True)
-        return np.array([np.log(v) if s.log else v / s.size for s, v in pairs])
+        return np.array([s.z(v) for s, v in zip(self._specs, value, strict=True)])
 
     @property
     def _specs(self) -> list[Spec]:
