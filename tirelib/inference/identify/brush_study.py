@@ -79,9 +79,8 @@ def stiffness_at(
     fit: BrushFit, load: FloatArray, pressure: FloatArray | None = None
 ) -> dict[str, FloatArray]:
     """Return 2 c a^2 over slip angle [N/rad] and slip ratio [N], shapes as the load's."""
-    zero, none = np.zeros_like(load), np.full_like(load, np.nan)
     where = np.full_like(load, fit.reference.pressure) if pressure is None else pressure
-    data = ForceData(load, where, zero, zero, zero, none, none, none, none, zero.astype(np.int64))
+    data = ForceData(load, where, np.zeros_like(load))
     across, along = slip_stiffnesses(fit.brush.parameters(data))
     return {"slip_angle": across, "slip_ratio": along}
 
@@ -95,7 +94,6 @@ def property_terms(study: Study, name: str) -> list[Term]:
     """Return what the tire's own property has beyond the best brush, for the parameter's z."""
     load, pressure = study.misfit.load, study.misfit.pressure
     forces = set(study.fit.rmse)
-    fitted = set(study.fit.names)
     side = "slip_angle" if "Fy" in forces else "slip_ratio"
 
     def slope(slip: str, factor: float) -> list[Term]:
@@ -103,11 +101,16 @@ def property_terms(study: Study, name: str) -> list[Term]:
 
     def length(factor: float) -> list[Term]:
         """Return ln a = ln 3 + ln (slope of Mz) - ln C."""
-        return [*_trail_terms(study, factor), *slope("slip_angle", -factor)]
+        slide = study.slide["slip_angle"]
+        moment = study.stiffness["slip_angle"] * study.fit.values["half_length"] / 3.0
+        trail = _pair(study, "Mz", (load, pressure), "slip_angle", slide, NEAR_ZERO, moment, factor)
+        return [*trail, *slope("slip_angle", -factor)]
 
-    has_length = "half_length" in fitted and {"Fy", "Mz"} <= forces
+    has_length = "half_length" in study.fit.names and {"Fy", "Mz"} <= forces
     if name == "friction":
-        return _peak_terms(study, side)
+        force, slide = "Fy" if side == "slip_angle" else "Fx", study.slide[side]
+        each = study.fit.values["friction"] * load / slide
+        return _pair(study, force, (load, pressure), side, slide, 1.0, each)
     if name == "half_length" and has_length:
         return length(1.0)
     if name in ("lateral_stiffness", "longitudinal_stiffness"):
@@ -121,51 +124,35 @@ def slope_terms(
     study: Study, slip: str, factor: float, load: float, pressure: float, size: float
 ) -> list[Term]:
     """Return factor times the change of ln C by the misfit's slope at zero slip."""
-    force = "Fy" if slip == "slip_angle" else "Fx"
-    scale = study.scale_of(force)
-    if scale is None:
-        return []
-    sign = -1.0 if force == "Fy" else 1.0
     slide = 3.0 * study.fit.values["friction"] * load / size
-    h = NEAR_ZERO * slide
-    each = sign * factor * scale / (2.0 * h * size)
-    where = known_pressure(pressure)
-    return _pair(force, load, where, slip, slide, h, each)
-
-
-def _trail_terms(study: Study, factor: float) -> list[Term]:
-    """Return factor times the change of ln (slope of Mz at zero slip)."""
-    scale = study.scale_of("Mz")
-    if scale is None:
-        return []
-    size = study.stiffness["slip_angle"] * study.fit.values["half_length"] / 3.0
-    slide = study.slide["slip_angle"]
-    h = NEAR_ZERO * slide
-    load, pressure, each = study.misfit.load, study.misfit.pressure, factor * scale / (2 * h * size)
-    return _pair("Mz", load, pressure, "slip_angle", slide, h, each)
-
-
-def _peak_terms(study: Study, slip: str) -> list[Term]:
-    """Return the change of ln mu by the misfit where the whole contact slides."""
-    force = "Fy" if slip == "slip_angle" else "Fx"
-    scale = study.scale_of(force)
-    if scale is None:
-        return []
-    sign = -1.0 if force == "Fy" else 1.0
-    load, pressure = study.misfit.load, study.misfit.pressure
-    each = 0.5 * sign * scale / (study.fit.values["friction"] * load)
-    far = study.slide[slip]
-    return _pair(force, load, pressure, slip, far, far, each)
+    force, at = "Fy" if slip == "slip_angle" else "Fx", (load, known_pressure(pressure))
+    return _pair(study, force, at, slip, slide, NEAR_ZERO, size, factor)
 
 
 def _pair(
-    force: str, load: float, pressure: float, slip: str, slide: float, at: float, factor: float
+    study: Study,
+    force: str,
+    at: tuple[float, float],
+    slip: str,
+    slide: float,
+    share: float,
+    slope: float,
+    factor: float = 1.0,
 ) -> list[Term]:
-    """Return the difference of the misfit at a slip and at its opposite, times a factor."""
+    """Return the change of the logarithm of a slope over the slip by the misfit, times a factor.
 
-    def place(at: float) -> tuple[float, ...]:
+    The slope is a force's between two slips of opposite sign, at a share of that at which all
+    slides, and at a load and pressure. Nothing is returned for a force that was not fitted.
+    """
+    scale = study.scale_of(force)
+    if scale is None:
+        return []
+    reach, sign = share * slide, -1.0 if force == "Fy" else 1.0
+    each = sign * factor * scale / (2.0 * reach * slope)
+
+    def place(slip_there: float) -> tuple[float, ...]:
         if slip == "slip_angle":
-            return load, pressure, at, 0.0, 0.0, slide, 1.0
-        return load, pressure, 0.0, at, 0.0, 1.0, slide
+            return *at, slip_there, 0.0, 0.0, slide, 1.0
+        return *at, 0.0, slip_there, 0.0, 1.0, slide
 
-    return [Term(force, place(s * at), s * factor) for s in (1.0, -1.0)]
+    return [Term(force, place(s * reach), s * each) for s in (1.0, -1.0)]

@@ -86,11 +86,15 @@ def levels(values: FloatArray) -> IntArray:
     return number
 
 
+def numbered(*rows: FloatArray | IntArray) -> IntArray:
+    """Return the number of each point's combination of values, rows of shape (n,), from 0."""
+    number = np.unique(np.stack(rows), axis=1, return_inverse=True)[1]
+    return np.asarray(number, dtype=np.int64).ravel()
+
+
 def cells_of_load(data: ForceData) -> IntArray:
     """Return the number of each point's load and pressure, from 0."""
-    pair = np.stack([levels(data.load), levels(data.pressure)])
-    number = np.unique(pair, axis=1, return_inverse=True)[1]
-    return np.asarray(number, dtype=np.int64).ravel()
+    return numbered(levels(data.load), levels(data.pressure))
 
 
 def band_errors(force: str, data: ForceData, error: FloatArray) -> tuple[BandError, ...]:

@@ -1,6 +1,7 @@
 """Forces and their conditions from campaigns: run means of steady runs, samples of sweeps."""
 
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +18,17 @@ TEMPERATURES = ("tread_temperature", "temperature", "tire_temperature")
 """Channels that tell the tread's temperature; the first that was recorded counts."""
 BLOCK = 10.0
 """Stretch of a sweep over which errors are taken to go together, [s]."""
-_UNKNOWN: FloatArray = np.empty(0)
+_ABSENT: FloatArray = np.empty(0)
+"""Stands for a field that is not given."""
+
+
+def _absent() -> Any:
+    return _ABSENT
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForceData:
-    """Points with forces; arrays of shape (n,), SI, ISO.
+    """Points with forces; arrays of shape (n,), SI, ISO; what is not given is zero or unknown.
 
     Attributes
     ----------
@@ -32,7 +38,8 @@ class ForceData:
     Fx, Fy, Mz : [N], [N], [N m]
         NaN where not recorded.
     block : array of int
-        Points of one run, or of one stretch of a sweep: their errors may go together.
+        Points of one run, or of one stretch of a sweep: their errors may go together. By default
+        each point has a block of its own.
     speed, temperature, time : [m/s], [K], [s]
         Speed of the road, temperature of the tread, time since the campaign began; NaN if unknown.
     """
@@ -40,21 +47,22 @@ class ForceData:
     load: FloatArray
     pressure: FloatArray
     slip_angle: FloatArray
-    slip_ratio: FloatArray
-    camber: FloatArray
-    omega: FloatArray
-    Fx: FloatArray
-    Fy: FloatArray
-    Mz: FloatArray
-    block: IntArray
-    speed: FloatArray = field(default_factory=lambda: _UNKNOWN)
-    temperature: FloatArray = field(default_factory=lambda: _UNKNOWN)
-    time: FloatArray = field(default_factory=lambda: _UNKNOWN)
+    slip_ratio: FloatArray = field(default_factory=_absent)
+    camber: FloatArray = field(default_factory=_absent)
+    omega: FloatArray = field(default_factory=_absent)
+    Fx: FloatArray = field(default_factory=_absent)
+    Fy: FloatArray = field(default_factory=_absent)
+    Mz: FloatArray = field(default_factory=_absent)
+    block: IntArray = field(default_factory=_absent)
+    speed: FloatArray = field(default_factory=_absent)
+    temperature: FloatArray = field(default_factory=_absent)
+    time: FloatArray = field(default_factory=_absent)
 
     def __post_init__(self) -> None:
-        for name in ("speed", "temperature", "time"):
-            if getattr(self, name) is _UNKNOWN:
-                object.__setattr__(self, name, np.full(np.shape(self.load), np.nan))
+        for name in (f.name for f in fields(self) if getattr(self, f.name) is _ABSENT):
+            size = np.shape(self.load)
+            blank = np.full(size, 0.0 if name in ("slip_ratio", "camber") else np.nan)
+            object.__setattr__(self, name, np.arange(*size) if name == "block" else blank)
         shapes = {np.shape(getattr(self, f.name)) for f in fields(self)}
         if len(shapes) != 1 or len(shapes.pop()) != 1:
             raise ShapeError(

@@ -105,7 +105,7 @@ def fit_sine(slip_angle: npt.ArrayLike, Fy: npt.ArrayLike) -> SineFit:
     best = min(runs, key=lambda run: float(run.cost))
     found = coefficients(best.x)
     spread = float(np.sqrt(2.0 * best.cost / (alpha.size - len(NAMES)))) * top
-    _, s, vt = np.linalg.svd(best.jac, full_matrices=False)
+    _, s, vt = np.linalg.svd(np.asarray(best.jac), full_matrices=False)
     root = vt.T / np.maximum(s, _WEAK * s[0]) * (size[:, None] * spread / top)
     covariance = np.asarray(root @ root.T)
     std = dict(zip(NAMES, np.sqrt(np.diag(covariance)).tolist(), strict=True))
