@@ -77,7 +77,7 @@ def advice(study: Study) -> dict[str, str]:
 
 def candidates(study: Study) -> tuple[Candidate, ...]:
     """Return the runs that are weighed: slips, loads and pressures beyond the campaign's."""
-    data, fit = study.problem.data, study.fit
+    data, fit = study.fit.problem.data, study.fit
     load, pressure = fit.reference.load, fit.reference.pressure
     side = tuple(n for n in ("Fy", "Mz") if n in fit.rmse) or ("Fy", "Mz")
     slide = float(np.rad2deg(study.slide["slip_angle"]))
@@ -117,7 +117,7 @@ def _points(*conditions: FloatArray | float) -> ForceData:
 
 def _opened(study: Study) -> BrushProblem:
     """Return the problem with the parameters that this campaign could not fit, free."""
-    problem = study.problem
+    problem = study.fit.problem
     closed = {
         name: why
         for name, (_, why) in problem.fixed.items()
@@ -152,7 +152,7 @@ def _information(
         problem,
         data=joined,
         forces=(force,),
-        half=ring_half(study.fit.tire, joined),
+        half=ring_half(problem.tire, joined),
         scale=np.array([_scale(study, force)]),
     )
     slope = here.jacobian(z)

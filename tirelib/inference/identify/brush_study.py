@@ -4,7 +4,7 @@ That is its own slope at zero slip, largest force and trail.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import stdtrit
@@ -13,9 +13,7 @@ from tirelib.core.arrays import FloatArray
 from tirelib.inference.identify.brush_cells import cells_of, slip_stiffnesses
 from tirelib.inference.identify.brush_fit import BrushFit
 from tirelib.inference.identify.brush_misfit import Misfit, Term, misfit_of
-from tirelib.inference.identify.brush_problem import ROBUST, BrushProblem
 from tirelib.inference.identify.force_data import ForceData
-from tirelib.inference.identify.ring_patch import ring_half
 
 NEAR_ZERO = 0.01
 """Slip, in units of full sliding, between whose signs the slope at zero is taken."""
@@ -23,12 +21,17 @@ NEAR_ZERO = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Study:
-    """A solved problem with its misfit: what intervals and advice are computed from."""
+    """A fit with its misfit: what intervals and advice are computed from.
+
+    Attributes
+    ----------
+    misfits : tuple of Misfit
+        About the brush, and about the curve without a bend.
+    stiffness : mapping of slip to float
+        2 c a^2 at the reference, [N/rad] and [N].
+    """
 
     fit: BrushFit
-    problem: BrushProblem
-    z: FloatArray
-    covariance: FloatArray
     misfits: tuple[Misfit, ...]
     stiffness: Mapping[str, float]
 
@@ -48,7 +51,7 @@ class Study:
 
     def scale_of(self, force: str) -> float | None:
         """Return the scale of a force; None if it was not fitted."""
-        forces, scale = self.problem.forces, self.problem.scale
+        forces, scale = self.fit.problem.forces, self.fit.problem.scale
         if force not in forces or scale is None:
             return None
         return float(scale[forces.index(force)])
@@ -59,20 +62,16 @@ class Study:
         return float(stdtrit(max(self.misfit.freedom, 1), 0.975))
 
 
-def study_of(fit: BrushFit, data: ForceData) -> Study:
-    """Return the study of a fit to data."""
-    half = ring_half(fit.tire, data)
-    problem = BrushProblem(data, tuple(fit.rmse), fit.names, fit.held, fit.reference, half)
-    z = problem.z_of(fit.value)
-    problem = replace(problem, scale=problem.misfit(z))
+def study_of(fit: BrushFit) -> Study:
+    """Return the study of a fit."""
     stiffness = stiffness_at(fit, np.array([fit.reference.load]))
     at_zero = {name: float(value[0]) for name, value in stiffness.items()}
-    cells = cells_of(problem, z)
+    cells = cells_of(fit.problem, fit.z)
     pressure = known_pressure(fit.reference.pressure)
     misfits = tuple(
         misfit_of(cells, fit.reference.load, pressure, smooth=smooth) for smooth in (False, True)
     )
-    return Study(fit, problem, z, problem.covariance(z, ROBUST), misfits, at_zero)
+    return Study(fit, misfits, at_zero)
 
 
 def stiffness_at(

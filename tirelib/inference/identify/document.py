@@ -135,7 +135,7 @@ def _brush(found: ForceIdentification) -> dict[str, Any]:
     fit = found.fit
     deviation = np.sqrt(np.diag(fit.covariance))
     with np.errstate(invalid="ignore"):
-        correlation = fit.covariance / np.outer(deviation, deviation)
+        correlation = fit.covariance / np.outer(deviation, deviation)  # of z as of the values
     source = "ring" if fit.tire is not None else "Mz" if "half_length" in fit.names else "assumed"
     return {
         "reference": {

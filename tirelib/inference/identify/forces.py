@@ -96,7 +96,7 @@ def identify_forces(
     tell("fitting the brush")
     fit = _fit(data, ring, campaign.header.axes, notes)
     tell("intervals of the brush")
-    study = study_of(fit, data)
+    study = study_of(fit)
     estimates = estimates_of(study, free_radius=campaign.header.tire.free_radius)
     if any("not_identifiable" in each.flags for each in estimates):
         helps = advice(study)
