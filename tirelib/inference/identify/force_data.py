@@ -88,7 +88,7 @@ class ForceData:
         return ForceData(*(getattr(self, f.name)[index] for f in fields(self)))
 
 
-def force_data(campaign: Campaign, *, every: int = 1, travel_speed: bool = False) -> ForceData:
+def force_data(campaign: Campaign, *, travel_speed: bool = False) -> ForceData:
     """Read the forces of a campaign.
 
     Steady runs give one point each, the mean of their samples; a sweep gives its samples. Points
@@ -97,8 +97,6 @@ def force_data(campaign: Campaign, *, every: int = 1, travel_speed: bool = False
 
     Parameters
     ----------
-    every : int
-        Each `every`-th sample of a sweep is taken.
     travel_speed : bool
         True if the recorded slip ratio is by the speed of travel, v, and not by v cos(alpha): a
         freely rolling wheel then reads cos(alpha) - 1. Runs of freely rolling kinds read zero
@@ -109,12 +107,10 @@ def force_data(campaign: Campaign, *, every: int = 1, travel_speed: bool = False
     CalibrationError
         If there is no point at all.
     """
-    if every < 1:
-        raise ParameterError(f"force data: every = {every}; allowed is every >= 1")
     parts: list[ForceData] = []
     count = 0
     for run in campaign.runs():
-        part = _sweep(run, every) if run.plan.kind == "sweep" else _mean(run)
+        part = _sweep(run) if run.plan.kind == "sweep" else _mean(run)
         if part is None:
             continue
         if run.plan.kind in FREE_ROLLING:
@@ -145,7 +141,7 @@ def _mean(run: Run) -> dict[str, FloatArray] | None:
     return _usable(out, np.zeros(1))
 
 
-def _sweep(run: Run, every: int) -> dict[str, FloatArray] | None:
+def _sweep(run: Run) -> dict[str, FloatArray] | None:
     """Return the samples of a sweep, or None without load or slip angle."""
     if run.rig_time is None or run.rig_time.size == 0:
         return None
@@ -153,11 +149,11 @@ def _sweep(run: Run, every: int) -> dict[str, FloatArray] | None:
     out = {}
     for name in CONDITIONS + FORCES:
         samples = run.rig.get(_MEASURED_AS.get(name, name))
-        given = np.full(size, getattr(run.plan, name, np.nan)) if samples is None else samples
-        out[name] = given[::every]
-    out |= {name: value[::every] for name, value in _further(run, size).items()}
-    out["time"] = (run.plan.start or 0.0) + run.rig_time[::every] - run.rig_time[0]
-    return _usable(out, np.floor((run.rig_time[::every] - run.rig_time[0]) / BLOCK))
+        blank = np.full(size, getattr(run.plan, name, np.nan))
+        out[name] = blank if samples is None else samples
+    out |= _further(run, size)
+    out["time"] = (run.plan.start or 0.0) + run.rig_time - run.rig_time[0]
+    return _usable(out, np.floor((run.rig_time - run.rig_time[0]) / BLOCK))
 
 
 def _further(run: Run, size: int) -> dict[str, FloatArray]:

@@ -224,7 +224,7 @@ def _check(data: ForceData) -> None:
     if len(data) > MOST_POINTS:
         raise CalibrationError(
             f"lateral force: {len(data)} points; allowed are {MOST_POINTS}: every point has its "
-            "own pressure; take run means, or thin the sweep (`every` of force_data)"
+            "own pressure; take run means, or thin the sweep"
         )
     missing = int((~np.isfinite(data.Fy)).sum())
     if missing:

@@ -333,7 +333,6 @@ def test_runs_are_means_and_sweeps_are_samples(tmp_path: Path) -> None:
     assert np.isnan(data.Mz).all()
     np.testing.assert_allclose(data.slip_angle[1:], angle[10:], atol=1e-9)
     assert data.block.tolist() == [0] + [1] * 90 + [2] * 100
-    assert len(force_data(read_campaign(tmp_path / "c"), every=10)) == 1 + 19
 
 
 def test_slip_ratio_by_travel_speed_becomes_that_of_the_wheel_plane(tmp_path: Path) -> None:
