@@ -110,7 +110,7 @@ def force_data(campaign: Campaign, *, travel_speed: bool = False) -> ForceData:
     parts: list[ForceData] = []
     count = 0
     for run in campaign.runs():
-        part = _sweep(run) if run.plan.kind == "sweep" else _mean(run)
+        part = _read(run)
         if part is None:
             continue
         if run.plan.kind in FREE_ROLLING:
@@ -130,46 +130,35 @@ def force_data(campaign: Campaign, *, travel_speed: bool = False) -> ForceData:
     )
 
 
-def _mean(run: Run) -> dict[str, FloatArray] | None:
-    """Return a steady run as one point, or None without load or slip angle."""
-    out = {}
-    for name in CONDITIONS + FORCES:
-        measured = run.mean(_MEASURED_AS.get(name, name))
-        out[name] = np.array([getattr(run.plan, name, np.nan) if measured is None else measured])
-    out |= {name: np.array([value.mean()]) for name, value in _further(run, 1).items()}
-    out["time"] = np.array([np.nan if run.plan.start is None else run.plan.start])
-    return _usable(out, np.zeros(1))
+def _read(run: Run) -> dict[str, FloatArray] | None:
+    """Return the means of a steady run or the samples of a sweep, None without load or slip angle.
 
-
-def _sweep(run: Run) -> dict[str, FloatArray] | None:
-    """Return the samples of a sweep, or None without load or slip angle."""
-    if run.rig_time is None or run.rig_time.size == 0:
+    What was not recorded is the set point.
+    """
+    swept = run.plan.kind == "sweep"
+    time = run.rig_time if swept else np.zeros(1)
+    if time is None or time.size == 0:
         return None
-    size = run.rig_time.size
-    out = {}
-    for name in CONDITIONS + FORCES:
-        samples = run.rig.get(_MEASURED_AS.get(name, name))
-        blank = np.full(size, getattr(run.plan, name, np.nan))
-        out[name] = blank if samples is None else samples
-    out |= _further(run, size)
-    out["time"] = (run.plan.start or 0.0) + run.rig_time - run.rig_time[0]
-    return _usable(out, np.floor((run.rig_time - run.rig_time[0]) / BLOCK))
 
+    def told(channel: str, given: float) -> FloatArray:
+        samples = run.rig.get(channel)
+        if samples is None or samples.size == 0:
+            return np.full(time.size, given)
+        return samples if swept else np.array([samples.mean()])
 
-def _further(run: Run, size: int) -> dict[str, FloatArray]:
-    """Return speed and tread temperature, of the length `size` where they were not recorded."""
-    out = {"speed": run.rig.get("speed", np.full(size, run.plan.speed))}
-    known = [run.rig[name] for name in TEMPERATURES if name in run.rig]
-    out["temperature"] = known[0] if known else np.full(size, np.nan)
-    return {
-        name: np.full(size, np.nan) if value.size == 0 else value for name, value in out.items()
+    out = {
+        name: told(_MEASURED_AS.get(name, name), getattr(run.plan, name, np.nan))
+        for name in CONDITIONS + FORCES
     }
-
-
-def _usable(part: dict[str, FloatArray], block: FloatArray) -> dict[str, FloatArray] | None:
+    out["speed"] = told("speed", run.plan.speed)
+    known = [name for name in TEMPERATURES if name in run.rig]
+    out["temperature"] = told((*known, "")[0], np.nan)
+    start = run.plan.start
+    out["time"] = (start or 0.0) + time - time[0]
+    if not swept and start is None:
+        out["time"] = np.full(1, np.nan)
     for name in ("slip_ratio", "camber"):
-        part[name] = np.nan_to_num(part[name])
-    keep = np.isfinite(part["slip_angle"]) & np.isfinite(part["load"]) & (part["load"] > 0.0)
-    if not keep.any():
-        return None
-    return {name: values[keep] for name, values in {**part, "block": block}.items()}
+        out[name] = np.nan_to_num(out[name])
+    out["block"] = np.floor((time - time[0]) / BLOCK)
+    keep = np.isfinite(out["slip_angle"]) & np.isfinite(out["load"]) & (out["load"] > 0.0)
+    return {name: values[keep] for name, values in out.items()} if keep.any() else None
