@@ -152,7 +152,7 @@ def _read(run: Run) -> dict[str, FloatArray] | None:
     }
     out["speed"] = told("speed", run.plan.speed)
     known = [name for name in TEMPERATURES if name in run.rig]
-    out["temperature"] = told((*known, "")[0], np.nan)
+    out["temperature"] = told(next(iter(known), ""), np.nan)
     start = run.plan.start
     out["time"] = (start or 0.0) + time - time[0]
     if not swept and start is None:
