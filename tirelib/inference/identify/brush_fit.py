@@ -18,7 +18,7 @@ import numpy as np
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import Tire
-from tirelib.inference.identify.brush_law import NEUTRAL, SPECS, BrushModel, Reference
+from tirelib.inference.identify.brush_law import SPECS, BrushModel, Reference
 from tirelib.inference.identify.brush_problem import ASSUMED_HALF_LENGTH, ROBUST, BrushProblem
 from tirelib.inference.identify.error_bands import BandError, band_errors
 from tirelib.inference.identify.force_checks import refuse_wrong_forces, slips_vary
@@ -249,8 +249,8 @@ def _choose(
             names.append(name)
         elif name == "half_length" and not ring:
             held[name] = (ASSUMED_HALF_LENGTH, reason)
-        elif name in NEUTRAL:
-            held[name] = (NEUTRAL[name], reason)
+        elif not SPECS[name].log:
+            held[name] = (0.0, reason)
     if "lateral_stiffness" not in (*names, *held):
         # braking alone: one stiffness for both directions
         names = ["lateral_stiffness", *(n for n in names if n != "longitudinal_stiffness")]
