@@ -25,14 +25,19 @@ from tirelib.core.parameters import Tire
 from tirelib.inference.identify.brush_fit import fit_brush
 from tirelib.inference.identify.brush_law import SPECS
 from tirelib.inference.identify.error_bands import bands, cells_of_load
+from tirelib.inference.identify.force_checks import ANGLE_SPAN
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.identify.ring_patch import profiles
 from tirelib.physics.brush.forces import brush_forces
 from tirelib.physics.brush.parameters import BrushParameters
 from tirelib.physics.contact.profiles import PressureProfile
 
-MOST_POINTS = 2000
-"""Profiles are solved and integrated point by point: take run means, or thin a sweep."""
+MOST_POINTS = 300
+"""Points that are compared; each has its own pressure profile."""
+LEAST_POINTS = 4
+"""Points of one load and pressure from which its stiffness can be fitted and points left out."""
+STILL = 0.01
+"""Slip ratio up to which a point rolls freely."""
 SIGNIFICANT = 2.0
 """Standard errors of the mean difference from which one pressure counts as better."""
 KINDS = ("ring", "parabola")
@@ -97,10 +102,19 @@ class PressureFit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PressureComparison:
-    """Lateral force by the ring's pressure and by the parabola (`KINDS`); all points first."""
+    """Lateral force by the ring's pressure and by the parabola (`KINDS`).
+
+    Attributes
+    ----------
+    table : tuple of PressureBand
+        All points first.
+    notes : tuple of str
+        Which points were left out, and why.
+    """
 
     fits: Mapping[str, PressureFit]
     table: tuple[PressureBand, ...]
+    notes: tuple[str, ...]
 
 
 def compare_pressures(
@@ -111,7 +125,8 @@ def compare_pressures(
     Parameters
     ----------
     data : ForceData
-        Run means, freely rolling, at least two slip angles; at most 2000 points.
+        Those are compared that roll freely and have Fy, at loads and pressures with enough slip
+        angles for a stiffness; of more than 300 some are left out evenly.
     tire : Tire
         Its ring gives pressure and contact length.
     stiffness : {"each", "one"}
@@ -122,15 +137,16 @@ def compare_pressures(
     Raises
     ------
     CalibrationError
-        If there are too many or too few points, or Fy or the slip angles do not suffice.
+        If no points or slip angles are left.
     ParameterError, ConvergenceError
         From fit, ring and contact.
     """
-    _check(data)
     if stiffness not in ("each", "one"):
         raise ParameterError(
             f"lateral force: stiffness = {stiffness!r}; allowed are 'each' and 'one'"
         )
+    chosen, notes = _chosen(data)
+    data = data.take(chosen)
     pair = profiles(tire, data.load, data.pressure, data.omega)
     conditions = cells_of_load(data)
     group = conditions if stiffness == "each" else np.zeros_like(conditions)
@@ -140,7 +156,7 @@ def compare_pressures(
         kind: _Brush(data, profile, group, tuple(start)[1:]).fit(start, folds)
         for kind, profile in zip(KINDS, pair, strict=True)
     }
-    return PressureComparison(fits, _table(data, fits))
+    return PressureComparison(fits, _table(data, fits), notes)
 
 
 def _start(data: ForceData, half: float) -> dict[str, float]:
@@ -220,22 +236,28 @@ class _Brush:
         return np.concatenate([own, slope[:, 1:]], axis=1)
 
 
-def _check(data: ForceData) -> None:
-    if len(data) > MOST_POINTS:
-        raise CalibrationError(
-            f"lateral force: {len(data)} points; allowed are {MOST_POINTS}: every point has its "
-            "own pressure; take run means, or thin the sweep"
+def _chosen(data: ForceData) -> tuple[IntArray, tuple[str, ...]]:
+    """Return the points whose load and pressure hold enough slip angles for a stiffness."""
+    free = np.flatnonzero(np.isfinite(data.Fy) & (np.abs(data.slip_ratio) <= STILL))
+    angle = data.slip_angle[free]
+    if not free.size or np.ptp(angle) < ANGLE_SPAN:
+        raise CalibrationError("no freely rolling runs over slip angle with Fy")
+    cell = cells_of_load(data.take(free))
+    members = [angle[cell == k] for k in range(int(cell.max()) + 1)]
+    told = [each.size >= LEAST_POINTS and np.ptp(each) >= ANGLE_SPAN for each in members]
+    enough = np.array(told)[cell]
+    notes: tuple[str, ...] = ()
+    if not enough.all():
+        note = (
+            f"{int((~enough).sum())} of {enough.size} points are left out, their load and pressure "
+            f"hold fewer than {LEAST_POINTS} points or less than {np.rad2deg(ANGLE_SPAN):.0f} deg "
+            "of slip angle"
         )
-    missing = int((~np.isfinite(data.Fy)).sum())
-    if missing:
-        raise CalibrationError(
-            f"lateral force: Fy is not measured at {missing} of {len(data)} points; leave them out"
-        )
-    if np.abs(data.slip_ratio).max() > 0.01:
-        raise CalibrationError(
-            f"lateral force: a slip ratio of {float(np.abs(data.slip_ratio).max()):.3g}; freely "
-            "rolling points are needed, up to 0.01; leave drive and brake runs out"
-        )
+        if not enough.any():
+            raise CalibrationError(note)
+        notes = (note,)
+    chosen = free[enough]
+    return chosen[:: -(-chosen.size // MOST_POINTS)], notes
 
 
 def _parts(data: ForceData, group: IntArray) -> IntArray:

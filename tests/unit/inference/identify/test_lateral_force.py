@@ -11,7 +11,6 @@ from tirelib.campaign import read_campaign
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import Tire, read_tire
 from tirelib.inference.identify.force_data import ForceData, force_data
-from tirelib.inference.identify.forces import _compared
 from tirelib.inference.identify.lateral_force import KINDS, PressureBand, compare_pressures
 from tirelib.inference.identify.ring_patch import profiles, ring_contact
 from tirelib.physics.brush.forces import brush_forces
@@ -115,15 +114,14 @@ def test_a_load_without_slip_angles_is_left_out_and_said() -> None:
     data = forces("ring")
     straight = np.abs(data.slip_angle) < 1e-9
     sparse = data.take(straight | (data.load < 3000.0))
-    notes: list[str] = []
-    found = _compared(sparse, TIRE, notes)
-    assert found is not None
+    found = compare_pressures(sparse, TIRE)
     assert found.table[0].points == 26
-    assert notes == [
-        "ring pressure against parabola: 2 of 28 points are left out, their load and pressure hold "
-        "fewer than 4 points or less than 1 deg of slip angle"
-    ]
-    assert _compared(data.take(straight | (data.slip_angle > 0.1)), TIRE, notes) is None
+    assert found.notes == (
+        "2 of 28 points are left out, their load and pressure hold fewer than 4 points or less "
+        "than 1 deg of slip angle",
+    )
+    with pytest.raises(CalibrationError, match="12 of 12 points are left out"):
+        compare_pressures(data.take(straight | (data.slip_angle > 0.1)), TIRE)
 
 
 def test_table_has_every_band_of_load_pressure_and_slip_angle() -> None:
@@ -155,9 +153,9 @@ def test_profiles_share_load_and_edges() -> None:
 @pytest.mark.parametrize(
     ("change", "options", "error", "message"),
     [
-        ({"Fy": np.nan}, {}, CalibrationError, "Fy is not measured at 52 of 52"),
-        ({"slip_ratio": 0.1}, {}, CalibrationError, "slip ratio of 0.1; freely rolling"),
-        ({"slip_angle": 0.0}, {}, CalibrationError, "the slip angle does not vary|span 0 deg"),
+        ({"Fy": np.nan}, {}, CalibrationError, "no freely rolling runs over slip angle with Fy"),
+        ({"slip_ratio": 0.1}, {}, CalibrationError, "no freely rolling runs"),
+        ({"slip_angle": 0.0}, {}, CalibrationError, "no freely rolling runs over slip angle"),
         ({}, {"stiffness": "some"}, ParameterError, "allowed are 'each' and 'one'"),
     ],
 )
@@ -170,10 +168,11 @@ def test_what_cannot_be_compared_is_refused(
         compare_pressures(changed, TIRE, **options)
 
 
-def test_too_many_points_are_refused() -> None:
+def test_of_many_points_some_are_compared() -> None:
     data = forces("ring")
-    with pytest.raises(CalibrationError, match="2080 points; allowed are 2000"):
-        compare_pressures(data.take(np.tile(np.arange(52), 40)), TIRE)
+    found = compare_pressures(data.take(np.tile(np.arange(52), 12)), TIRE)
+    assert found.table[0].points == 208  # each third of 624
+    assert found.table[0].ring_rmse < 0.5
 
 
 RIG = Tire(
