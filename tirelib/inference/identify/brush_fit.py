@@ -48,8 +48,8 @@ class BrushFit:
         For each fitted parameter: "ok", "at boundary" or "not identifiable from this campaign".
     rmse, r2, peak : mapping of force to float
         Root mean square error, share of variance explained, largest measured size.
-    errors : tuple of BandError
-        By force: all points, then bands of load, pressure and slip angle.
+    errors : mapping of force to tuple of BandError
+        All points, then bands of load, pressure and slip angle.
     """
 
     problem: BrushProblem
@@ -59,7 +59,7 @@ class BrushFit:
     rmse: Mapping[str, float]
     r2: Mapping[str, float]
     peak: Mapping[str, float]
-    errors: tuple[BandError, ...]
+    errors: Mapping[str, tuple[BandError, ...]]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -167,7 +167,7 @@ def fit_brush(
         {name: float(np.sqrt(np.nanmean(e**2))) for name, e in error.items()},
         {name: float(1.0 - np.nanvar(e) / np.nanvar(measured[name])) for name, e in error.items()},
         {name: float(np.nanmax(np.abs(m))) for name, m in measured.items()},
-        tuple(row for name, e in error.items() for row in band_errors(name, data, e)),
+        {name: band_errors(data, e) for name, e in error.items()},
     )
 
 

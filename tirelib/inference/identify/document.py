@@ -189,7 +189,7 @@ def _forces(found: ForceIdentification) -> dict[str, Any]:
                 "rmse_percent_of_peak": 100.0 * rmse / fit.peak[name],
                 "r2": fit.r2[name],
                 "peak": fit.peak[name],
-                "bands": [_band(row) for row in fit.errors if row.force == name],
+                "bands": [_band(row) for row in fit.errors[name]],
             }
             for name, rmse in fit.rmse.items()
         },
@@ -200,7 +200,6 @@ def _band(row: BandError | PressureBand) -> dict[str, Any]:
     """Return the errors of a band, its range in engineers' units."""
     told = asdict(row)
     by, low, high = (told.pop(name) for name in ("by", "low", "high"))
-    told.pop("force", None)
     quantity = QUANTITIES.get(by)
     if quantity is None:
         return {"by": by, "low": low, "high": high, "range_unit": "", **told}

@@ -35,9 +35,8 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class BandError:
-    """Error of one force over one band: root mean square, and mean (prediction less measured)."""
+    """Error of a force over one band: root mean square, and mean (prediction less measured)."""
 
-    force: str
     by: str
     low: float
     high: float
@@ -97,16 +96,15 @@ def cells_of_load(data: ForceData) -> IntArray:
     return numbered(levels(data.load), levels(data.pressure))
 
 
-def band_errors(force: str, data: ForceData, error: FloatArray) -> tuple[BandError, ...]:
+def band_errors(data: ForceData, error: FloatArray) -> tuple[BandError, ...]:
     """Return the error of a force by band; points without a measurement are NaN in `error`."""
     out = []
     for band in bands(data):
         part = error[band.member & np.isfinite(error)]
         if part.size:
             rms = float(np.sqrt(np.mean(part**2)))
-            out.append(
-                BandError(force, band.by, band.low, band.high, part.size, rms, float(part.mean()))
-            )
+            bias = float(part.mean())
+            out.append(BandError(band.by, band.low, band.high, part.size, rms, bias))
     return tuple(out)
 
 

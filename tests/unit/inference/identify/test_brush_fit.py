@@ -190,7 +190,7 @@ def test_missing_measurements_are_left_out() -> None:
 def test_bands_report_the_error_where_it_is() -> None:
     data = make(WIDE, pressures=(1.6e5, 2.4e5))
     error = np.where(data.load > 5000.0, 30.0, 0.0) + np.where(data.pressure < 2e5, 4.0, -4.0)
-    rows = {(r.by, round(r.low)): r for r in band_errors("Fy", data, error) if r.by in LEVELS}
+    rows = {(r.by, round(r.low)): r for r in band_errors(data, error) if r.by in LEVELS}
     assert rows["load", 6000].bias == pytest.approx(30.0)
     assert rows["load", 1500].rmse == pytest.approx(4.0)
     assert rows["pressure", 160000].bias == pytest.approx(30.0 / 4 + 4.0)
