@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from scipy import linalg
 
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.inference.identify.campaign_data import Data
@@ -86,7 +87,9 @@ class RunWhitening:
             [np.full(speed.size, ZERO), DEPTH_SHARE * depth[known], GROWTH * speed**2]
         )
         covariance = np.diag(random[known]) + common.T @ common
-        return cls(whiten, known, gain, np.linalg.inv(np.linalg.cholesky(covariance)))
+        lower = linalg.cholesky(covariance, lower=True)
+        inverse = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True)
+        return cls(whiten, known, gain, np.asarray(inverse))
 
     def __call__(self, rows: FloatArray) -> FloatArray:
         """Return whitened rows of rows (..., n_runs * n_phi + n_known)."""
