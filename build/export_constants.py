@@ -19,8 +19,9 @@ from tirelib.core.parameters import Number, TireFile
 from tirelib.core.threads import one_thread
 from tirelib.inference.compare import magic_points
 from tirelib.inference.compare.force_model import ForceModel, force_model_of
+from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.magic import fit as magic_fit
-from tirelib.inference.magic.fit import MagicPoints, fit_magic
+from tirelib.inference.magic.fit import fit_magic
 from tirelib.physics.brush.mf import magic_forces
 
 TIRES = 8
@@ -59,12 +60,7 @@ def changed(module: Any, **values: Any) -> Iterator[None]:
             setattr(module, name, value)
 
 
-def taken(points: MagicPoints, rows: np.ndarray) -> MagicPoints:
-    """Return some of the points."""
-    return MagicPoints(*(getattr(points, name)[rows] for name in MagicPoints.__slots__))
-
-
-def error(points: MagicPoints, asked: MagicPoints) -> float:
+def error(points: ForceData, asked: ForceData) -> float:
     """Return the rms error of Fy at points asked for, over the largest Fy; NaN without a fit."""
     try:
         tire = fit_magic(points, radius=0.32, nominal_load=4000.0).tire
@@ -107,7 +103,7 @@ def pure(models: list[ForceModel]) -> None:
         shown(f"{name}: largest change of {force} by the other slip, % of its peak", tried)
 
 
-def noisy(points: MagicPoints, seed: int, share: float = 0.01) -> MagicPoints:
+def noisy(points: ForceData, seed: int, share: float = 0.01) -> ForceData:
     """Return points whose side force has noise, as a share of its peak."""
     noise = share * np.abs(points.Fy).max()
     return replace(
@@ -115,16 +111,16 @@ def noisy(points: MagicPoints, seed: int, share: float = 0.01) -> MagicPoints:
     )
 
 
-def made(models: list[ForceModel], **constants: Any) -> list[MagicPoints]:
+def made(models: list[ForceModel], **constants: Any) -> list[ForceData]:
     """Return the points of every model with some constants of `magic_points` changed."""
     with changed(magic_points, **constants):
         return [magic_points.model_points(model, **RANGE) for model in models]
 
 
-def upright(models: list[ForceModel], **constants: Any) -> list[MagicPoints]:
+def upright(models: list[ForceModel], **constants: Any) -> list[ForceData]:
     """Return the points in pure side slip at the reference pressure."""
     return [
-        taken(p, (p.slip_ratio == 0.0) & (p.pressure == 2.2e5)) for p in made(models, **constants)
+        p.take((p.slip_ratio == 0.0) & (p.pressure == 2.2e5)) for p in made(models, **constants)
     ]
 
 
@@ -136,7 +132,7 @@ def main() -> None:
     tried: dict[str, list[float]] = {}
     for each in (1, 2, 4):
         rng = np.random.default_rng(0)
-        few = [taken(p, np.sort(rng.permutation(p.load.size)[: 12 * each])) for p in side]
+        few = [p.take(np.sort(rng.permutation(p.load.size)[: 12 * each])) for p in side]
         with changed(magic_fit, POINTS_PER_COEFFICIENT=1):
             tried[str(each)] = [
                 error(noisy(a, k), b) for k, (a, b) in enumerate(zip(few, side, strict=True))

@@ -22,7 +22,7 @@ from hidden.plan import day
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import TirelibError
 from tirelib.inference.identify.campaign_data import straight_runs
-from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.identify import fitted
 from tirelib.inference.identify.waveform_fit import WaveformFit
 from tirelib.measured.waveforms import Waveforms
 from tirelib.model.slopes import slopes_of
@@ -89,7 +89,7 @@ class Case:
 
 def base_fit(waves: Waveforms, held_out: BoolArray) -> WaveformFit:
     """Identify the base model from the runs that are fitted."""
-    return estimated(straight_runs(waves.take(~held_out)))[1]
+    return fitted(straight_runs(waves.take(~held_out)))[1]
 
 
 def make_case(

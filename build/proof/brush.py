@@ -50,7 +50,7 @@ def rows(plan: str, seed: int) -> list[Row]:
     tire = magic(rng)
     loads, angles, ratios = PLANS[plan]
     data = magic_data(tire, rng, ratios, loads, angles)
-    study = study_of(fit_brush(data), data)
+    study = study_of(fit_brush(data))
     friction = float(magic_forces(tire, study.fit.reference.load, 0.1).friction_y)
     told = [("friction", friction, e) for e in estimates_of(study) if e.name == "friction"]
     out = [_row(name, true, e.value, e.low, e.high) for name, true, e in told]

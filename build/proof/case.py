@@ -14,7 +14,7 @@ from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.parameters import Tire
 from tirelib.effects.state import Operating
 from tirelib.inference.identify.campaign_data import straight_runs
-from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.identify import estimates_of, fitted
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import Waveforms
 from tirelib.model.base import operating_points, values_of
@@ -96,7 +96,8 @@ def _make(seed: int) -> dict[str, Any]:
     data = measured(seed)
     runs = straight_runs(data.waves)
     began = time.perf_counter()
-    start, fit, estimates = estimated(runs)
+    start, fit = fitted(runs)
+    estimates = estimates_of(start, fit)
     took = time.perf_counter() - began
     pressure = start.tire.pressure
     found = tests_of(seed, data.tire, pressure)
@@ -190,7 +191,7 @@ def held_out(waves: Waveforms) -> dict[str, float]:
 
 def _ratio(waves: Waveforms, out: BoolArray) -> float:
     kept = straight_runs(waves.take(~out))
-    _, fit, _ = estimated(kept)
+    _, fit = fitted(kept)
     rest = straight_runs(waves.take(~out | out))
     points = operating_points(rest.waves)
     wave = solved(fit.values, points, low_pass=rest.waves.low_pass).waveform

@@ -27,7 +27,7 @@ from tirelib.inference.compare.error import error_of
 from tirelib.inference.compare.model import TireModel
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.inference.identify.discrepancy import Discrepancy
-from tirelib.inference.identify.identify import estimate, prior_std, start_file
+from tirelib.inference.identify.identify import intervals_of, prior_std, start_file
 from tirelib.inference.identify.waveform_fit import WaveformFit, fit_waveforms
 from tirelib.model.base import PLAIN, values_of
 from tirelib.model.solution import solved
@@ -95,9 +95,9 @@ def row(case: Case, without: Sequence[str], prior: Mapping[str, float]) -> Row:
     true = dict(case.truth["numbers"])
     for name in ("k_u", "k_v"):  # of 2 bar
         true[name] += true[f"{name}_slope"] * (float(values["pressure"]) - 2e5)
-    numbers = {}
+    numbers, every = {}, {each.name: each for each in intervals_of(start, fit)}
     for short, name in NUMBERS.items():
-        e = estimate(fit, [c.name for c in free].index(name), start)
+        e = every[name]
         numbers[short] = Found(
             e.value / true[short] - 1.0,
             bool(e.low <= true[short] <= e.high),

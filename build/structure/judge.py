@@ -32,7 +32,7 @@ from tirelib.core.errors import TirelibError
 from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
-from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.identify import fitted
 from tirelib.inference.problems.strain import StrainProblem
 from tirelib.inference.statistics.hypothesis import Hypothesis
 from tirelib.inference.statistics.plain import load
@@ -116,7 +116,7 @@ def judged(file: Path, *, out: Path, false_alarm: float) -> dict[str, Any]:
 def _identified(runs: StraightRuns, kept: Path) -> Mapping[str, float | FloatArray]:
     kept.parent.mkdir(exist_ok=True)
     if not kept.exists():
-        kept.write_bytes(pickle.dumps(dict(estimated(runs)[1].values)))
+        kept.write_bytes(pickle.dumps(dict(fitted(runs)[1].values)))
     values: Mapping[str, float | FloatArray] = pickle.loads(kept.read_bytes())
     return values
 

@@ -30,7 +30,7 @@ from tirelib.core.errors import TirelibError
 from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE
 from tirelib.inference.identify.campaign_data import straight_runs
-from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.identify import fitted
 from tirelib.inference.problems.strain import StrainProblem
 from tirelib.inference.statistics.hypothesis import judged
 from tirelib.inference.statistics.null import OWN
@@ -110,7 +110,7 @@ def fit_of(file: Path) -> Fit | None:
     """Return the model without effects fitted to a campaign, or None if there is none."""
     runs = straight_runs(load_case(file).waves)
     try:
-        _, identified, _ = estimated(runs)
+        _, identified = fitted(runs)
         problem = StrainProblem(runs, identified.values, list(CATALOGUE.values()))
         spread = {effect.name: FIRST["effect"] for effect in problem.living}
         groups = problem.remainder(problem.start, problem.solve(problem.start))

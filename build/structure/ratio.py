@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from structure.family import Array
 from tirelib.inference.identify.campaign_data import straight_runs
 from tirelib.inference.identify.delay import by_delay
-from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.identify import fitted
 from tirelib.inference.identify.random_effects import Whitening, scales, tangents, whitening_of
 from tirelib.measured.waveforms import Waveforms
 from tirelib.model.slopes import slopes_of
@@ -52,7 +52,7 @@ class Yard:
     def of(cls, waves: Waveforms) -> "Yard":
         """Fit the base to a plain campaign."""
         runs = straight_runs(waves)
-        _, fit, _ = estimated(runs)
+        _, fit = fitted(runs)
         data = runs.data()
         found = solved(fit.values, data.points, low_pass=data.low_pass)
         by = slopes_of(found, fit.free)

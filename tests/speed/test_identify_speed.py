@@ -13,7 +13,7 @@ import pytest
 from tests.unit.inference.identify.model_waves import TIRE, made_waves
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.inference.identify.discrepancy import Discrepancy
-from tirelib.inference.identify.identify import estimated
+from tirelib.inference.identify.identify import estimates_of, fitted
 from tirelib.inference.identify.waveform_fit import fit_waveforms
 from tirelib.measured.signal import LowPass
 from tirelib.model.base import BARE, FREE, values_of
@@ -44,7 +44,7 @@ def test_identification_time_and_its_growth_with_runs(capsys: pytest.CaptureFixt
     times = {}
     for count in (7, 19, 60):
         runs = campaign(count)
-        times[count] = least(lambda runs=runs: estimated(runs))
+        times[count] = least(lambda runs=runs: estimates_of(*fitted(runs)))
     power = np.log(times[60] / times[19]) / np.log(60.0 / 19.0)
     with capsys.disabled():
         print({n: f"{t:.2f} s" for n, t in times.items()}, f"grows with runs^{power:.2f}")

@@ -12,7 +12,7 @@ import numpy as np
 
 from build.structure.cases import load_case
 from tirelib.inference.identify.campaign_data import straight_runs
-from tirelib.inference.identify.identify import estimate, fitted
+from tirelib.inference.identify.identify import fitted, intervals_of
 
 FILE = Path(__file__).parents[1] / "golden" / "sliding_edge.npz"
 
@@ -20,7 +20,7 @@ FILE = Path(__file__).parents[1] / "golden" / "sliding_edge.npz"
 def test_identification_settles_where_slopes_hold_on_one_side_only() -> None:
     runs = straight_runs(load_case(FILE).waves)
     start, fit = fitted(runs)
-    estimates = [estimate(fit, k, start) for k in range(len(fit.free))]
+    estimates = intervals_of(start, fit)
     # with one damping for all numbers it ended after 37 steps, 40 units of the cost higher
     assert fit.steps < 100
     assert fit.found.cost < 1200.0

@@ -83,7 +83,9 @@ def export(
     from tirelib.core.parameters import read_tire
     from tirelib.core.parameters.tir import write_tir
     from tirelib.inference.compare.force_model import force_model_of
-    from tirelib.inference.compare.magic_points import campaign_points, model_points
+    from tirelib.inference.compare.magic_points import model_points
+    from tirelib.inference.identify.force_data import force_data
+    from tirelib.inference.identify.force_points import force_points
     from tirelib.inference.magic.file import tir_of, words
     from tirelib.inference.magic.fit import fit_magic
     from tirelib.model.registration import registered_effects
@@ -92,7 +94,8 @@ def export(
     if Path(source).is_dir():
         campaign = read_campaign(source)
         what = f"the forces of the campaign {campaign.header.name!r}"
-        fit = fit_magic(campaign_points(campaign), radius=given or campaign.header.tire.free_radius)
+        measured = force_points(force_data(campaign)).data
+        fit = fit_magic(measured, radius=given or campaign.header.tire.free_radius)
     else:
         file = read_tire(source)
         unloaded = given or _free_radius(file)

@@ -197,7 +197,7 @@ def next_test(
             )
             told = diagnosis_document(assess(found, model))
             suspects, hypotheses = suspects_of(told, catalogue), found.verdict.hypotheses
-        elif suspects.effects:
+        elif suspects.names:
             problem = StrainProblem(
                 runs, model.values, list(catalogue.values()), effects, strengths
             )
@@ -250,7 +250,7 @@ def _for_force(
         else:
             given = [name.strip() for name in str(names).split(",")]
             suspects = given_suspects(given, has, catalogue, case.quantity)
-        envelope = force_envelope(case, sweep, **declared) if suspects.effects else None
+        envelope = force_envelope(case, sweep, **declared) if suspects.names else None
         plan = plan_force_test(
             case,
             suspects,

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError, TirelibError
 from tirelib.core.units import TABLE
 from tirelib.effects.brush_state import BrushState
@@ -184,13 +185,15 @@ class Effect:
             name for name in self.needs if not np.isfinite(getattr(conditions, name)).all()
         )
 
-    def at(self, strength: Strength) -> tuple[str, Callable[[Any], Any]]:
-        """Return hook and change for the chain at one strength.
+    def at(self, strength: Strength | FloatArray) -> tuple[str, Callable[[Any], Any]]:
+        """Return hook and change for the chain at one strength, or its array of components.
 
         The change raises `ParameterError` with name, file and line if the law fails, returns no
         state, changes the shape of a field, or makes numbers that are none; and if a condition
         that the effect needs is not measured.
         """
+        if isinstance(strength, np.ndarray):
+            strength = float(strength[0]) if strength.size == 1 else tuple(strength.tolist())
         given = 1 if np.ndim(strength) == 0 else len(strength)  # type: ignore[arg-type]
         if given != self.components:
             raise ParameterError(

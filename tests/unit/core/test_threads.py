@@ -20,7 +20,7 @@ from tirelib.estimators.train import train
 from tirelib.inference.compare.compare import compare
 from tirelib.inference.diagnose.diagnose import diagnose
 from tirelib.inference.diagnose.forces.diagnose import diagnose_force
-from tirelib.inference.extend.extension import extended, extended_brush
+from tirelib.inference.extend.extension import extended, without_effect
 from tirelib.inference.identify.forces import identify_forces
 from tirelib.inference.identify.identify import identify
 from tirelib.inference.identify.whole import identify_whole
@@ -91,7 +91,7 @@ class Asked:
         (diagnose, 3, ()),
         (diagnose_force, 2, ()),
         (extended, 3, ()),
-        (extended_brush, 3, ()),
+        (without_effect, 2, ()),
         (next_test, 3, ()),
         (selftest, 3, ()),
         (train, 1, ()),

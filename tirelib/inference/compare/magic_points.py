@@ -1,17 +1,16 @@
-"""Points that a Magic Formula is fitted to: those of a model's brush, or those of a campaign."""
+"""Points that a Magic Formula is fitted to where no campaign has any: those of a model's brush."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
-from tirelib.campaign import Campaign
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.inference.compare.force_model import ForceModel
-from tirelib.inference.identify.force_data import ForceData, force_data
-from tirelib.inference.identify.force_points import ForcePoints, force_points
-from tirelib.inference.magic.fit import MagicPoints
+from tirelib.inference.identify.force_data import ForceData
+from tirelib.inference.identify.force_points import ForcePoints
 from tirelib.physics.brush.predict import PointForces
 
 LOADS = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75)
@@ -28,7 +27,7 @@ SHARES = np.array([0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0])
 
 def model_points(
     model: ForceModel, *, slip_angle: float, slip_ratio: float, speed: float, radius: float
-) -> MagicPoints:
+) -> ForceData:
     """Return the forces of a model over loads, pressures, cambers, and pure and combined slips.
 
     Parameters
@@ -74,29 +73,12 @@ def model_points(
             parts += away
     points = np.concatenate(parts)
     found = forces(points)
-    loads, pressures, cambers, alpha, kappa = points.T
-    return MagicPoints(loads, alpha, kappa, cambers, pressures, found.Fx, found.Fy, found.Mz)
-
-
-def campaign_points(campaign: Campaign) -> MagicPoints:
-    """Return the means of steady runs and of the passes of sweeps.
-
-    Raises
-    ------
-    CalibrationError
-        If no run has forces over a slip angle.
-    """
-    data = force_points(force_data(campaign)).data
-    names = ("load", "slip_angle", "slip_ratio", "camber", "pressure", "Fx", "Fy", "Mz")
-    return MagicPoints(*(getattr(data, name) for name in names))
+    return replace(_points(points, speed, radius).data, Fx=found.Fx, Fy=found.Fy, Mz=found.Mz)
 
 
 def _points(points: FloatArray, speed: float, radius: float) -> ForcePoints:
     """Return rows of load, pressure, camber, slip angle and slip ratio as points of steady runs."""
     load, pressure, camber, alpha, kappa = points.T
-    n = np.arange(load.size)
-    none, speeds = np.full(load.size, np.nan), np.full(load.size, speed)
-    data = ForceData(
-        load, pressure, alpha, kappa, camber, speeds / radius, none, none, none, n, speed=speeds
-    )
+    n, speeds = np.arange(load.size), np.full(load.size, speed)
+    data = ForceData(load, pressure, alpha, kappa, camber, speeds / radius, speed=speeds)
     return ForcePoints(data, np.zeros(n.size), np.ones_like(n), n, np.zeros(n.size, dtype=bool))

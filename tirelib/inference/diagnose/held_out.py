@@ -15,10 +15,11 @@ import numpy as np
 
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.quantities import QUANTITIES
-from tirelib.inference.identify.campaign_data import LEAST_RUNS, Data
+from tirelib.inference.identify.campaign_data import Data
 from tirelib.inference.identify.error_bands import levels
 from tirelib.inference.identify.force_bench import ForceBench
 from tirelib.inference.identify.force_points import set_points
+from tirelib.inference.identify.strain_notes import LEAST_RUNS
 from tirelib.inference.problems.force_plan import varies
 
 LEAST_LOADS, LEAST_PRESSURES = 3, 2

@@ -5,7 +5,6 @@ way to it. Where a diagnosis of the same campaign and model is at hand, its fits
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,20 +16,17 @@ from tirelib.effects import Effect
 from tirelib.inference.compare.force_model import ForceModel, force_model_of
 from tirelib.inference.compare.model import TireModel, model_of
 from tirelib.inference.diagnose.assess import Assessment, ForceAssessment
-from tirelib.inference.diagnose.forces.case import force_cases
+from tirelib.inference.diagnose.forces.case import ForceCase, force_cases
 from tirelib.inference.extend.document import extension_document
 from tirelib.inference.extend.extension import (
     Extension,
     ForceExtension,
+    StrainCase,
     case_for,
     extended,
-    extended_brush,
-    force_models,
+    models_of,
     refuse,
-    refuse_brush,
-    remove_brush_effect,
-    remove_effect,
-    strain_models,
+    without_effect,
 )
 from tirelib.inference.extend.model_file import extended_file
 from tirelib.inference.identify.campaign_data import straight_runs
@@ -38,7 +34,6 @@ from tirelib.inference.identify.force_data import FORCES
 from tirelib.measured.waveforms import measure_waveforms
 
 Progress = Callable[[str], None]
-Known = TireModel | ForceModel
 Extended = tuple[TireFile, dict[str, Any]]
 """A model after a step, and ``tirelib-extension/1`` of it."""
 
@@ -80,28 +75,33 @@ def additions(
     names = [effect.name for effect in effects]
     if len(set(names)) < len(names):
         raise ParameterError(f"effects {', '.join(names)}: one is named twice; leave it out")
-    step_of: Callable[[Effect, Any], Extension | ForceExtension]
-    if isinstance(diagnosis, ForceAssessment):
-        case, brush = diagnosis.case, diagnosis.diagnosis.models
-        _belongs(case.name, case.model, campaign, force_model_of(file, catalogue))
-        step_of = partial(extended_brush, brush, case)
-    elif diagnosis is None and acts_on_forces(effects[0], quantity):
-        case = case_for(force_cases(campaign, file, catalogue, quantity), effects[0])
-        for effect in effects:
-            refuse_brush(case, effect)
-        step_of = partial(extended_brush, force_models(case, effects, progress), case)
-    else:
-        model = model_of(file, catalogue)
-        for effect in effects:
-            refuse(model, effect)
-        if diagnosis is None:
-            runs = straight_runs(measure_waveforms(campaign, progress=progress))
-            strain = strain_models(runs, model, effects, progress)
+    case: StrainCase | ForceCase
+    models: Any
+    if diagnosis is not None:
+        models = diagnosis.diagnosis.models
+        if isinstance(diagnosis, ForceAssessment):
+            case = diagnosis.case
+            _belongs(case, campaign, force_model_of(file, catalogue))
         else:
-            strain = diagnosis.diagnosis.models
-            _belongs(strain.runs.waves.header.name, diagnosis.given, campaign, model)
-        step_of = partial(extended, strain, model)
-    return _chain(effects, file, campaign, catalogue, step_of, failed)
+            case = StrainCase(models.runs, diagnosis.given)
+            _belongs(case, campaign, model_of(file, catalogue))
+        for effect in effects:
+            refuse(case.model, effect)
+    else:
+        case = _case(effects, file, campaign, quantity, catalogue, progress, refuse)
+        models = models_of(case, effects, progress)
+    before = None
+    for effect in effects:
+        try:
+            step = extended(models, case, effect, before)
+            file, document = _written(file, step, campaign, catalogue)
+        except TirelibError as error:
+            if failed is None:
+                raise
+            failed(effect, error)
+            continue
+        before = step.after
+        yield file, document
 
 
 def removal(
@@ -120,13 +120,30 @@ def removal(
     ParameterError
         If the model does not have the effect.
     """
-    if acts_on_forces(effect, quantity):
-        case = case_for(force_cases(campaign, file, catalogue, quantity), effect)
-        brush = remove_brush_effect(case, effect, progress=progress)
-        return _written(file, brush, campaign, catalogue)
-    runs = straight_runs(measure_waveforms(campaign, progress=progress))
-    step = remove_effect(runs, model_of(file, catalogue), effect, progress=progress)
+    case = _case([effect], file, campaign, quantity, catalogue, progress)
+    step = without_effect(case, effect, progress=progress)
     return _written(file, step, campaign, catalogue)
+
+
+def _case(
+    effects: Sequence[Effect],
+    file: TireFile,
+    campaign: Campaign,
+    quantity: str | None,
+    catalogue: Mapping[str, Effect],
+    progress: Progress | None,
+    check: Callable[[TireModel | ForceModel, Effect], None] = lambda model, effect: None,
+) -> StrainCase | ForceCase:
+    """Return what effects are fitted to, after a look at each with the model."""
+    if acts_on_forces(effects[0], quantity):
+        case = case_for(force_cases(campaign, file, catalogue, quantity), effects[0])
+        for effect in effects:
+            check(case.model, effect)
+        return case
+    model = model_of(file, catalogue)
+    for effect in effects:
+        check(model, effect)
+    return StrainCase(straight_runs(measure_waveforms(campaign, progress=progress)), model)
 
 
 def acts_on_forces(effect: Effect, quantity: str | None) -> bool:
@@ -134,8 +151,11 @@ def acts_on_forces(effect: Effect, quantity: str | None) -> bool:
     return quantity not in (None, "strain") or (quantity is None and effect.hook == "brush")
 
 
-def _belongs(name: str, of: Known, campaign: Campaign, model: Known) -> None:
+def _belongs(
+    case: StrainCase | ForceCase, campaign: Campaign, model: TireModel | ForceModel
+) -> None:
     """Refuse a diagnosis of another campaign, or of another model."""
+    name, of = case.name, case.model
     same = [effect.effect.name for effect in of.used] == [each.effect.name for each in model.used]
     same = same and of.values.keys() == model.values.keys()
     same = same and all(
@@ -173,25 +193,3 @@ def _written(
             errors = {"error_before": old.given, "error_after": now.given, "error_unit": now.unit}
             others[name] = errors
     return new, document
-
-
-def _chain(
-    effects: Sequence[Effect],
-    file: TireFile,
-    campaign: Campaign,
-    catalogue: Mapping[str, Effect],
-    step_of: Callable[[Effect, Any], Extension | ForceExtension],
-    failed: Callable[[Effect, TirelibError], None] | None,
-) -> Iterator[Extended]:
-    before = None
-    for effect in effects:
-        try:
-            step = step_of(effect, before)
-            file, document = _written(file, step, campaign, catalogue)
-        except TirelibError as error:
-            if failed is None:
-                raise
-            failed(effect, error)
-            continue
-        before = step.after
-        yield file, document

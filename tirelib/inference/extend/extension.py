@@ -1,35 +1,92 @@
-"""One effect more or less: a model fitted to straight runs or to a force, judged on others."""
+"""One effect more or less: a model fitted to straight runs or to a force, judged on others.
+
+What differs between strain and forces is how a model is fitted to its campaign, what its floor is
+and what can be left out: `Models` say it.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from typing import Any, Generic
 
 import numpy as np
 
-from tirelib.core.errors import ParameterError, TirelibError
+from tirelib.core.arrays import FloatArray
+from tirelib.core.errors import CalibrationError, ParameterError, TirelibError
 from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.inference.compare.error import ModelError
+from tirelib.inference.compare.force_model import ForceModel
 from tirelib.inference.compare.model import TireModel
 from tirelib.inference.diagnose.diagnose import FALSE_ALARM, plain_tires
 from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.diagnose.forces.models import ForceFit, ForceModels
 from tirelib.inference.diagnose.forces.models import plain_tires as plain_of_force
+from tirelib.inference.diagnose.held_out import Fold, pooled
+from tirelib.inference.diagnose.models import F
 from tirelib.inference.diagnose.strain_models import Fitted, StrainModels
-from tirelib.inference.extend.step import (
-    Step,
-    added,
-    refuse_absent,
-    refuse_second,
-    removed,
-    without,
-)
 from tirelib.inference.identify.campaign_data import StraightRuns
 from tirelib.inference.problems.strain import StrainProblem
 from tirelib.inference.problems.strain_living import in_base
 from tirelib.inference.statistics.hypotheses import Hypotheses
 
 Progress = Callable[[str], None]
+SIGNIFICANT = 2.0
+"""Standard deviations below which a strength is no different from zero."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StrainCase:
+    """Straight runs and a model of their strain, as `ForceCase` has a force and its model."""
+
+    runs: StraightRuns
+    model: TireModel
+
+    @property
+    def name(self) -> str:
+        """Name of the campaign."""
+        return self.runs.waves.header.name
+
+
+@dataclass(frozen=True, eq=False)
+class Step(Generic[F]):
+    """A model before and after an effect was added or removed, both fitted.
+
+    Attributes
+    ----------
+    action : str
+        add or remove.
+    strength, std : shape (components,)
+        With the effect, in its unit.
+    floor : float
+        Error that structure leaves.
+    folds : tuple
+        What is left out in turn.
+    held_before, held_after : tuple of float
+        Errors on it, one per fold.
+    flags : tuple of str
+        out_of_range, not_significant, no_gain, heldout_worse.
+    """
+
+    action: str
+    effect: Effect
+    strength: FloatArray
+    std: FloatArray
+    before: F
+    after: F
+    floor: float
+    folds: tuple[Fold, ...]
+    held_before: tuple[float, ...]
+    held_after: tuple[float, ...]
+    flags: tuple[str, ...]
+
+    @property
+    def pooled(self) -> dict[str, float]:
+        """The held-out errors as documents and histories have them."""
+        return {
+            "heldout_error_before": pooled(self.held_before, self.folds),
+            "heldout_error_after": pooled(self.held_after, self.folds),
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,14 +155,28 @@ class ForceExtension(Step[ForceFit]):
         }
 
 
+def models_of(
+    case: StrainCase | ForceCase, more: Sequence[Effect] = (), progress: Progress | None = None
+) -> StrainModels | ForceModels:
+    """Return models about the one of a case; `more` effects may be the user's own."""
+    known = [*CATALOGUE.values(), *(each for each in more if each.name not in CATALOGUE)]
+    if isinstance(case, ForceCase):
+        given, families = case.as_given(known), plain_of_force(case.quantity)
+        return ForceModels(case, Hypotheses(given, families, FALSE_ALARM, progress), progress)
+    problem = StrainProblem(case.runs, case.model.values, known, *case.model.of_strain)
+    return StrainModels(Hypotheses(problem, plain_tires(), FALSE_ALARM, progress), progress)
+
+
 @one_thread()
 def extended(
-    models: StrainModels, given: TireModel, effect: Effect, before: Fitted | None = None
-) -> Extension:
+    models: StrainModels | ForceModels,
+    case: StrainCase | ForceCase,
+    effect: Effect,
+    before: Fitted | ForceFit | None = None,
+) -> Extension | ForceExtension:
     """Return a model with one effect more; values and all strengths are fitted anew.
 
-    `given` is the model as its file has it; `before` is one of the models, with effects that were
-    added before.
+    `before` is one of the models, with effects that were added before; the case's own by default.
 
     Raises
     ------
@@ -114,14 +185,21 @@ def extended(
     ConvergenceError
         If a fit does not settle.
     """
-    step = added(models, effect, before)
-    return _extension(step, models, models, given if before is None else None)
+    if reason := models.dead(effect):
+        raise CalibrationError(
+            f"effect {effect.name!r}: this campaign cannot show it: {reason}; measure such runs, "
+            "or leave the effect out"
+        )
+    kind: Any = models
+    first = before or kind.at()
+    after = kind.with_effect(first, effect)
+    return _judged("add", effect, (kind, first), (kind, after), None if before else case)
 
 
 @one_thread()
-def remove_effect(
-    runs: StraightRuns, model: TireModel, effect: Effect, *, progress: Progress | None = None
-) -> Extension:
+def without_effect(
+    case: StrainCase | ForceCase, effect: Effect, *, progress: Progress | None = None
+) -> Extension | ForceExtension:
     """Return a model without one of its effects; the rest is fitted anew.
 
     Raises
@@ -131,98 +209,100 @@ def remove_effect(
     ConvergenceError
         If a fit does not settle.
     """
-    refuse_absent(model.name, model.of_strain[0], effect, "strain")
-    models = strain_models(runs, model, [effect], progress)
-    fewer = TireModel.fitted(models.at().values, *without(models.at(), effect))
-    others = strain_models(runs, fewer, [effect], progress)
-    return _extension(removed(models, effect, others), models, others, model)
+    model, acts_on = case.model, "the brush" if isinstance(case, ForceCase) else "strain"
+    if effect.name not in (names := [each.name for each in _has(model)]):
+        raise ParameterError(
+            f"{model.name}: it has no effect {effect.name!r} of {acts_on} to remove; it has "
+            f"{', '.join(names) or 'none'}"
+        )
+    models: Any = models_of(case, [effect], progress)
+    fit = models.at()
+    stay = [k for k, each in enumerate(fit.effects) if each.name != effect.name]
+    kept = [fit.effects[k] for k in stay], [fit.strengths[k] for k in stay]
+    fewer: Any = replace(case, model=model.fitted(fit.values, *kept))  # type: ignore[arg-type]
+    others: Any = models_of(fewer, [effect], progress)
+    return _judged("remove", effect, (models, fit), (others, others.at()), case)
 
 
-def _extension(
-    step: Step[Fitted], models: StrainModels, others: StrainModels, given: TireModel | None
-) -> Extension:
-    """Return a step with its runs and errors."""
-    told, refitted = models.least_error(step.before, given)
+def _judged(
+    action: str,
+    effect: Effect,
+    first: tuple[Any, Any],
+    second: tuple[Any, Any],
+    given: StrainCase | ForceCase | None,
+) -> Extension | ForceExtension:
+    """Return the step between two fits, each with the models that it is one of.
+
+    Its error before is that of the given case's model, or that of the first fit.
+    """
+    (models, before), (others, after) = first, second
+    having = after if action == "add" else before
+    index = [each.name for each in having.effects].index(effect.name)
+    strength, std = having.strengths[index], having.strength_std(index)
+    folds = tuple(models.folds)
+    held_before, held_after = models.held_out(before), others.held_out(after)
+    worse = [new > old for new, old in zip(held_after, held_before, strict=True)]
+    flags = {
+        "out_of_range": ((strength < effect.low) | (strength > effect.high)).any(),
+        "not_significant": (np.abs(strength) < SIGNIFICANT * std).all(),
+        "no_gain": action == "add" and after.error >= before.error * (1.0 - 1e-6),
+        "heldout_worse": any(each and fold.main for each, fold in zip(worse, folds, strict=True)),
+    }
+    told = {
+        "action": action,
+        "effect": effect,
+        "strength": strength,
+        "std": std,
+        "before": before,
+        "after": after,
+        "floor": others.floor(after),
+        "folds": folds,
+        "held_before": held_before,
+        "held_after": held_after,
+        "flags": tuple(flag for flag, on in flags.items() if on),
+    }
+    if isinstance(models, ForceModels):
+        error = before.error if given is None else models.case.given
+        return ForceExtension(**told, case=models.case, given=error)
+    as_given, refitted = models.least_error(before, given and given.model)
     return Extension(
-        **vars(step),
-        given=told,
+        **told,
+        given=as_given,
         refitted=refitted,
-        reached=step.after.reached,
-        out_before=models.left_out(step.before),
-        out_after=others.left_out(step.after),
+        reached=after.reached,
+        out_before=models.left_out(before),
+        out_after=others.left_out(after),
         runs=models.runs,
     )
 
 
-def strain_models(
-    runs: StraightRuns,
-    model: TireModel,
-    more: Sequence[Effect],
-    progress: Progress | None = None,
-) -> StrainModels:
-    """Return models about one on straight runs; `more` effects may be the user's own."""
-    problem = StrainProblem(runs, model.values, _catalogue(more), *model.of_strain)
-    return StrainModels(Hypotheses(problem, plain_tires(), FALSE_ALARM, progress), progress)
+def _has(model: TireModel | ForceModel) -> list[Effect]:
+    """Return the effects of a model that its quantity shows."""
+    brush = isinstance(model, ForceModel)
+    return [each.effect for each in model.used if (each.effect.hook == "brush") == brush]
 
 
-@one_thread()
-def extended_brush(
-    models: ForceModels, case: ForceCase, effect: Effect, before: ForceFit | None = None
-) -> ForceExtension:
-    """Return a brush with one effect more; arguments and errors as of `extended`."""
-    given = case.given if before is None else before.error
-    return ForceExtension(**vars(added(models, effect, before)), case=case, given=given)
-
-
-@one_thread()
-def remove_brush_effect(
-    case: ForceCase, effect: Effect, *, progress: Progress | None = None
-) -> ForceExtension:
-    """Return a brush without one of its effects; errors as of `remove_effect`."""
-    refuse_absent(case.model.name, case.effects, effect, "the brush")
-    models = force_models(case, [effect], progress)
-    fewer = case.model.fitted(models.at().values, *without(models.at(), effect))
-    others = force_models(replace(case, model=fewer), [effect], progress)
-    return ForceExtension(**vars(removed(models, effect, others)), case=case, given=case.given)
-
-
-def force_models(
-    case: ForceCase, more: Sequence[Effect] = (), progress: Progress | None = None
-) -> ForceModels:
-    """Return models about the brush of a case; `more` effects may be the user's own."""
-    given, families = case.as_given(_catalogue(more)), plain_of_force(case.quantity)
-    return ForceModels(case, Hypotheses(given, families, FALSE_ALARM, progress), progress)
-
-
-def _catalogue(more: Sequence[Effect]) -> list[Effect]:
-    return [*CATALOGUE.values(), *(each for each in more if each.name not in CATALOGUE)]
-
-
-def refuse(model: TireModel, effect: Effect) -> None:
-    """Raise ParameterError if a model has an effect, or its base fits it, or it is of the brush."""
-    if effect.name in in_base(model.values):
+def refuse(model: TireModel | ForceModel, effect: Effect) -> None:
+    """Raise ParameterError if a model has an effect, or its base fits it, or it acts elsewhere."""
+    if isinstance(model, ForceModel):
+        if effect.hook != "brush":
+            raise ParameterError(
+                f"effect {effect.name!r} acts on strain, which forces do not show; leave "
+                "--quantity out, or choose an effect of the brush"
+            )
+    elif effect.name in in_base(model.values):
         raise ParameterError(
             f"effect {effect.name!r}: the base model has it as a fitted number; choose another one"
         )
-    if effect.hook == "brush":
+    elif effect.hook == "brush":
         raise ParameterError(
             f"effect {effect.name!r} acts on the brush, which strain does not show; choose an "
             "effect of another stage"
         )
-    refuse_second(model.name, model.of_strain[0], effect)
-
-
-def refuse_brush(case: ForceCase, effect: Effect) -> None:
-    """Raise ParameterError if a model has an effect, or it does not act on the brush."""
-    _refuse_of_strain(case, effect)
-    refuse_second(case.model.name, case.effects, effect)
-
-
-def _refuse_of_strain(case: ForceCase, effect: Effect) -> None:
-    if effect.hook != "brush":
+    if effect.name in {each.name for each in _has(model)}:
         raise ParameterError(
-            f"effect {effect.name!r} acts on strain, which forces do not show; leave "
-            f"--quantity {case.quantity} out, or choose an effect of the brush"
+            f"{model.name}: it has the effect {effect.name!r} already; choose another one, or take "
+            "it out first with --remove"
         )
 
 
@@ -245,9 +325,9 @@ def case_for(cases: Sequence[ForceCase], effect: Effect) -> ForceCase:
     for case in cases:
         if effect.name in {each.name for each in case.effects}:
             return case
-        _refuse_of_strain(case, effect)
+        refuse(case.model, effect)
         try:
-            models = force_models(case, [effect])
+            models: Any = models_of(case, [effect])
             if models.dead(effect):
                 continue
             ratio = models.with_effect(models.at(), effect).error / models.at().error

@@ -7,13 +7,14 @@ load's power at one load) is free here, with a vague prior, so that its lack cou
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from tirelib.core.arrays import FloatArray
-from tirelib.inference.identify.brush_cells import CellConditions
+from tirelib.inference.identify.brush_cells import places
 from tirelib.inference.identify.brush_law import point_parameters
 from tirelib.inference.identify.brush_misfit import ForceMisfit, Shape, kernel
 from tirelib.inference.identify.brush_problem import ASSUMED_HALF_LENGTH, BrushProblem
@@ -38,15 +39,8 @@ NO_RUN = (
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Candidate:
-    """A run, or a channel, that could be added.
-
-    Attributes
-    ----------
-    forces : tuple of str
-        Recorded in it.
-    """
+class Candidate(NamedTuple):
+    """A run, or a channel, that could be added: in words, which forces it records, and where."""
 
     words: str
     forces: tuple[str, ...]
@@ -58,12 +52,12 @@ def advice(study: Study) -> dict[str, str]:
     problem = _opened(study)
     z = problem.z_of(np.array([_value(study, name) for name in problem.names]))
     known = {each.cells.force: each for each in study.misfit.forces}
-    have = {name: each.cells.at for name, each in known.items()}
+    have = {name: _points(*each.cells.at[:5]) for name, each in known.items()}
 
     def spread(added: Candidate | None) -> FloatArray:
         total = np.eye(z.size) / PRIOR**2
         for force in dict.fromkeys([*have, *(added.forces if added else ())]):
-            parts: list[ForceData | CellConditions] = [have[force]] if force in have else []
+            parts = [have[force]] if force in have else []
             parts += [added.data] if added and force in added.forces else []
             total += _information(study, problem, z, force, parts, known.get(force))
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(total))))
@@ -83,7 +77,7 @@ def advice(study: Study) -> dict[str, str]:
 
 def candidates(study: Study) -> tuple[Candidate, ...]:
     """Return the runs that are weighed: slips, loads and pressures beyond the campaign's."""
-    data, fit = study.problem.data, study.fit
+    data, fit = study.fit.problem.data, study.fit
     load, pressure = fit.reference.load, fit.reference.pressure
     side = tuple(n for n in ("Fy", "Mz") if n in fit.rmse) or ("Fy", "Mz")
     slide = float(np.rad2deg(study.slide["slip_angle"]))
@@ -94,28 +88,36 @@ def candidates(study: Study) -> tuple[Candidate, ...]:
     one_load = np.ptp(data.load) < 0.3 * load
     other = 0.5 * float(data.load.min()) if one_load else 1.5 * float(data.load.max())
     at, several = f"at {load:.0f} N", "slip angles of 1 to 6 deg"
-    out = [
-        Candidate(f"slip angles up to {far:.0f} deg {at}", side, _runs(large, load, pressure)),
-        Candidate(f"{several}, either sign, {at}", side, _runs(small, load, pressure)),
-        Candidate(f"{several} at another load, {other:.0f} N", side, _runs(small, other, pressure)),
-        Candidate(
-            f"slip ratios of 0.01 to 0.15, drive and brake, {at}",
-            ("Fx",),
-            _runs(ratios, load, pressure, along=True),
-        ),
+    drive = f"slip ratios of 0.01 to 0.15, drive and brake, {at}"
+    asked = [
+        (f"slip angles up to {far:.0f} deg {at}", side, (load, pressure, large)),
+        (f"{several}, either sign, {at}", side, (load, pressure, small)),
+        (f"{several} at another load, {other:.0f} N", side, (other, pressure, small)),
+        (drive, ("Fx",), (load, pressure, 0.0, ratios)),
     ]
     if np.isfinite(pressure):
         words = f"{several} at {1.3e-5 * pressure:.2g} bar"
-        out.append(Candidate(words, side, _runs(small, load, 1.3 * pressure)))
+        asked.append((words, side, (load, 1.3 * pressure, small)))
+    out = [Candidate(words, forces, _points(*where)) for words, forces, where in asked]
     if "Mz" not in fit.rmse and np.ptp(data.slip_angle) > 0.0:
         some = data.take(np.arange(0, len(data), max(1, len(data) // 200)))
         out.append(Candidate("Mz recorded in the same runs", ("Mz",), some))
     return tuple(out)
 
 
+def _points(*conditions: FloatArray | float) -> ForceData:
+    """Return points at loads, pressures, slip angles, slip ratios and cambers.
+
+    Their forces are one: only slopes at the points matter.
+    """
+    given = np.broadcast_arrays(*conditions)
+    one = np.ones(given[0].size)
+    return replace(ForceData(*given), Fx=one, Fy=one, Mz=one)
+
+
 def _opened(study: Study) -> BrushProblem:
     """Return the problem with the parameters that this campaign could not fit, free."""
-    problem = study.problem
+    problem = study.fit.problem
     closed = {
         name: why
         for name, (_, why) in problem.fixed.items()
@@ -126,11 +128,6 @@ def _opened(study: Study) -> BrushProblem:
         names.append("longitudinal_stiffness")
     fixed = {name: at for name, at in problem.fixed.items() if name not in closed}
     return replace(problem, names=tuple(names), fixed=fixed)
-
-
-def _values(study: Study) -> dict[str, float]:
-    """Return every value; a half length from the ring is no number of its own."""
-    return {name: value for name, value in study.fit.values.items() if np.isfinite(value)}
 
 
 def _value(study: Study, name: str) -> float:
@@ -145,16 +142,17 @@ def _information(
     problem: BrushProblem,
     z: FloatArray,
     force: str,
-    parts: Sequence[ForceData | CellConditions],
+    parts: Sequence[ForceData],
     known: ForceMisfit | None,
 ) -> FloatArray:
     """Return J^T K^-1 J of one force at points, with scatter and smooth misfit in K."""
-    joined = _joined(parts)
+    names = ("load", "pressure", "slip_angle", "slip_ratio", "camber")
+    joined = _points(*(np.concatenate([getattr(part, n) for part in parts]) for n in names))
     here = replace(
         problem,
         data=joined,
         forces=(force,),
-        half=ring_half(study.fit.tire, joined),
+        half=ring_half(problem.tire, joined),
         scale=np.array([_scale(study, force)]),
     )
     slope = here.jacobian(z)
@@ -162,31 +160,15 @@ def _information(
         shape, variance = Shape(0.5, 1.0, 0.9), 1.0
     else:
         shape, variance = known.shape, min(known.variance, _MOST_VARIANCE)
-    brush = point_parameters(_values(study), joined, study.fit.reference, here.half)
-    at = CellConditions.of(brush, joined)
-    scatter = (at.load / study.misfit.load) ** 2
+    # a half length from the ring is no number of its own
+    values = {name: value for name, value in study.fit.values.items() if np.isfinite(value)}
+    at = places(point_parameters(values, joined, study.fit.reference, here.half), joined)
+    scatter = (at[0] / study.misfit.load) ** 2
     smooth = kernel(force, shape, at, study.misfit.load)
     K = shape.share * smooth + np.diag((1.0 - shape.share) * scatter)
     floor = 1e-8 * float(np.trace(K)) / len(joined)
     solved = cho_solve(cho_factor(K + floor * np.eye(len(joined)), lower=True), slope)
     return np.asarray(slope.T @ solved / max(variance, 1e-12))
-
-
-def _joined(parts: Sequence[ForceData | CellConditions]) -> ForceData:
-    """Return steady points with forces of one: only the slopes at them matter."""
-    return _steady(
-        *(
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("load", "pressure", "slip_angle", "slip_ratio", "camber")
-        )
-    )
-
-
-def _steady(
-    load: FloatArray, pressure: FloatArray, angle: FloatArray, ratio: FloatArray, camber: FloatArray
-) -> ForceData:
-    one, unknown, block = np.ones(load.size), np.full(load.size, np.nan), np.arange(load.size)
-    return ForceData(load, pressure, angle, ratio, camber, unknown, one, one, one, block)
 
 
 def _scale(study: Study, force: str) -> float:
@@ -196,10 +178,3 @@ def _scale(study: Study, force: str) -> float:
         return known
     size = fit.values["friction"] * fit.reference.load
     return _SHARE * size * (_value(study, "half_length") if force == "Mz" else 1.0)
-
-
-def _runs(slips: FloatArray, load: float, pressure: float, *, along: bool = False) -> ForceData:
-    """Return steady runs over one of the slips."""
-    one, zero = np.ones(slips.size), np.zeros(slips.size)
-    angle, ratio = (zero, slips) if along else (slips, zero)
-    return _steady(load * one, pressure * one, angle, ratio, zero)

@@ -8,7 +8,7 @@ import numpy as np
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.inference.identify.brush_law import point_parameters
 from tirelib.inference.identify.brush_problem import ROBUST, BrushProblem
-from tirelib.inference.identify.error_bands import levels
+from tirelib.inference.identify.error_bands import levels, numbered
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.physics.brush.predict import PointParameters
 
@@ -21,50 +21,13 @@ _SLIPS = 36
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CellConditions:
-    """Where forces are looked at, arrays of shape (m,).
-
-    Attributes
-    ----------
-    load, pressure, slip_angle, slip_ratio, camber : [N], [Pa], [rad], [-], [rad]
-    slide_angle, slide_ratio : [rad], [-]
-        Slips at which the brush slides as a whole, at this load and pressure.
-    """
-
-    load: FloatArray
-    pressure: FloatArray
-    slip_angle: FloatArray
-    slip_ratio: FloatArray
-    camber: FloatArray
-    slide_angle: FloatArray
-    slide_ratio: FloatArray
-
-    @classmethod
-    def of(cls, brush: PointParameters, data: ForceData) -> "CellConditions":
-        """Return the conditions of a brush at points."""
-        pressure = np.nan_to_num(data.pressure, nan=1.0)
-        return cls(
-            data.load,
-            pressure,
-            data.slip_angle,
-            data.slip_ratio,
-            data.camber,
-            *sliding_slips(brush, data.load),
-        )
-
-    def mapped(self, change: Callable[[FloatArray], FloatArray]) -> "CellConditions":
-        """Return the conditions with each array changed alike."""
-        return CellConditions(*(change(getattr(self, name)) for name in self.__slots__))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Cells:
     """Misfit and its slopes by cell, of one force, over the force's scale.
 
     Attributes
     ----------
-    at : CellConditions
-        Means over the cells.
+    at : shape (7, m)
+        Means of `places` over the cells.
     misfit : shape (m,)
         Mean of measured less predicted.
     smooth : shape (m,)
@@ -75,10 +38,23 @@ class Cells:
     """
 
     force: str
-    at: CellConditions
+    at: FloatArray
     misfit: FloatArray
     smooth: FloatArray
     slope: FloatArray
+
+
+def places(brush: PointParameters, data: ForceData) -> FloatArray:
+    """Return where forces are looked at, shape (7, n).
+
+    Load [N], pressure [Pa] (1 where unknown), slip angle [rad], slip ratio, camber [rad], and the
+    slip angle [rad] and slip ratio at which the brush slides as a whole there.
+    """
+    across, along = slip_stiffnesses(brush)
+    force = 3.0 * np.asarray(brush.friction) * data.load
+    pressure = np.nan_to_num(data.pressure, nan=1.0)
+    slides = np.arctan(force / across), force / along
+    return np.stack([data.load, pressure, data.slip_angle, data.slip_ratio, data.camber, *slides])
 
 
 def cells_of(problem: BrushProblem, z: FloatArray) -> tuple[Cells, ...]:
@@ -88,7 +64,7 @@ def cells_of(problem: BrushProblem, z: FloatArray) -> tuple[Cells, ...]:
     slope = problem.jacobian(z).reshape(*residual.shape, z.size)
     number = cell_numbers(data)
     brush = point_parameters(problem.at(z), data, problem.reference, problem.half)
-    at, scale = CellConditions.of(brush, data), np.asarray(problem.scale)
+    at, scale = places(brush, data), np.asarray(problem.scale)
     out = []
     for k, name in enumerate(problem.forces):
         weight = np.isfinite(getattr(data, name)) * (
@@ -97,8 +73,8 @@ def cells_of(problem: BrushProblem, z: FloatArray) -> tuple[Cells, ...]:
         mean = _mean_over(number, weight)
         misfit = -mean(residual[k])
         bend = mean(_bend(name, brush, data)) / float(scale[k])
-        columns = np.stack([mean(slope[k, :, j]) for j in range(z.size)], axis=1)
-        out.append(Cells(name, at.mapped(mean), misfit, misfit + bend, columns))
+        slopes = np.stack([mean(column) for column in slope[k].T], axis=1)
+        out.append(Cells(name, np.stack(list(map(mean, at))), misfit, misfit + bend, slopes))
     return tuple(out)
 
 
@@ -111,13 +87,6 @@ def _mean_over(number: IntArray, weight: FloatArray) -> Callable[[FloatArray], F
         return np.asarray(np.bincount(number, weight * values)[used] / total[used])
 
     return mean
-
-
-def sliding_slips(brush: PointParameters, load: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the slip angles [rad] and slip ratios at which the whole contact slides."""
-    across, along = slip_stiffnesses(brush)
-    force = 3.0 * np.asarray(brush.friction) * load
-    return np.arctan(force / across), np.asarray(force / along)
 
 
 def slip_stiffnesses(brush: PointParameters) -> tuple[FloatArray, FloatArray]:
@@ -156,16 +125,15 @@ def cell_numbers(data: ForceData) -> IntArray:
         return np.arange(len(data))
     share = 1.0
     while True:
-        rows = [
+        number = numbered(
             levels(data.load),
             levels(data.pressure),
             np.round(data.camber / (_CAMBER * share)),
             _bins(data.slip_angle, share),
             _bins(data.slip_ratio, share),
-        ]
-        _, number = np.unique(np.stack(rows), axis=1, return_inverse=True)
+        )
         if number.max() < MOST_CELLS:
-            return np.asarray(number, dtype=np.int64).ravel()
+            return number
         share *= 1.5
 
 

@@ -62,14 +62,12 @@ def estimates_of(study: Study, *, free_radius: float | None = None) -> tuple[Est
     """
     names, fit = study.fit.names, study.fit
     errors = _errors(study, np.eye(len(names)), [property_terms(study, name) for name in names])
-    slope = study.problem.slope_of(study.z)
+    slope = fit.problem.slope_of(fit.z)
     out = []
     for k, (name, value) in enumerate(zip(names, fit.value.tolist(), strict=True)):
         error, spec, unit = errors[k], SPECS[name], float(slope[k])
-        low, high = value + error.low * spec.size, value + error.high * spec.size
-        if spec.log:
-            low, high = value * float(np.exp(error.low)), value * float(np.exp(error.high))
-        low, high = max(low, spec.low), min(high, spec.high)
+        low = max(spec.moved(value, error.low), spec.low)
+        high = min(spec.moved(value, error.high), spec.high)
         flags = []
         if fit.status[k] == "at boundary":
             flags.append("at_boundary")
@@ -113,7 +111,7 @@ def _errors(
     out = []
     for k, row in enumerate(gradient):
         used = row != 0.0
-        own = float(row[used] @ study.covariance[np.ix_(used, used)] @ row[used])
+        own = float(row[used] @ study.fit.covariance[np.ix_(used, used)] @ row[used])
         inner = min(study.quantile * float(np.sqrt(own)), _FAR)
         low, high = -inner, inner
         for mean, variance in lacks:
@@ -127,7 +125,8 @@ def _errors(
 
 def slip_stiffness(study: Study) -> tuple[SlipStiffness, ...]:
     """Return cornering and longitudinal stiffness at each load and pressure of the data."""
-    data, fit = study.problem.data, study.fit
+    fit, z = study.fit, study.fit.z
+    data = fit.problem.data
     shown_by = {"slip_angle": {"Fy", "Mz"}, "slip_ratio": {"Fx"}}
     slips = [slip for slip, names in shown_by.items() if names & set(fit.rmse)]
     number = cells_of_load(data)
@@ -135,11 +134,10 @@ def slip_stiffness(study: Study) -> tuple[SlipStiffness, ...]:
     load = np.bincount(number, data.load) / count
     pressure = np.bincount(number, data.pressure) / count
     value = stiffness_at(fit, load, pressure)
-    gradient = {slip: np.empty((load.size, study.z.size)) for slip in slips}
-    for k in range(study.z.size):
-        moved = study.z.copy()
-        moved[k] += _STEP
-        other = stiffness_at(replace(fit, value=study.problem.values_of(moved)), load, pressure)
+    gradient = {slip: np.empty((load.size, z.size)) for slip in slips}
+    for k in range(z.size):
+        moved = z + _STEP * (np.arange(z.size) == k)
+        other = stiffness_at(replace(fit, z=moved), load, pressure)
         for slip in slips:
             gradient[slip][:, k] = np.log(other[slip] / value[slip]) / _STEP
     keys = [(slip, i) for i in range(load.size) for slip in slips]

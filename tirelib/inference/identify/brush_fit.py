@@ -18,7 +18,7 @@ import numpy as np
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import Tire
-from tirelib.inference.identify.brush_law import NEUTRAL, SPECS, BrushModel, Reference
+from tirelib.inference.identify.brush_law import SPECS, BrushModel, Reference
 from tirelib.inference.identify.brush_problem import ASSUMED_HALF_LENGTH, ROBUST, BrushProblem
 from tirelib.inference.identify.error_bands import BandError, band_errors
 from tirelib.inference.identify.force_checks import refuse_wrong_forces, slips_vary
@@ -38,44 +38,68 @@ class BrushFit:
 
     Attributes
     ----------
-    names : tuple of str
-        Names of the fitted parameters, as in `tirelib.inference.identify.brush_law.SPECS`.
-    value, std : arrays, shape (p,)
-        In the parameters' SI units; std is infinite where the data do not hold a parameter.
-    covariance : array, shape (p, p)
+    problem : BrushProblem
+        With the final scale of each force.
+    z : shape (p,)
+        Its solution.
+    covariance : shape (p, p)
+        Covariance of z; infinite where the data do not hold a parameter.
     status : tuple of str
         For each fitted parameter: "ok", "at boundary" or "not identifiable from this campaign".
-    held : mapping of name to (value, reason)
-        Parameters that were not fitted.
-    reference : Reference
-        Load and pressure of a0.
-    tire : Tire or None
-        Gives the half lengths, if any.
     rmse, r2, peak : mapping of force to float
         Root mean square error, share of variance explained, largest measured size.
-    errors : tuple of BandError
-        By force: all points, then bands of load, pressure and slip angle.
+    errors : mapping of force to tuple of BandError
+        All points, then bands of load, pressure and slip angle.
     """
 
-    names: tuple[str, ...]
-    value: FloatArray
-    std: FloatArray
+    problem: BrushProblem
+    z: FloatArray
     covariance: FloatArray
     status: tuple[str, ...]
-    held: Mapping[str, tuple[float, str]]
-    reference: Reference
-    tire: Tire | None
     rmse: Mapping[str, float]
     r2: Mapping[str, float]
     peak: Mapping[str, float]
-    errors: tuple[BandError, ...]
-    points: int
+    errors: Mapping[str, tuple[BandError, ...]]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the fitted parameters, as in `tirelib.inference.identify.brush_law.SPECS`."""
+        return self.problem.names
+
+    @property
+    def held(self) -> Mapping[str, tuple[float, str]]:
+        """Value and reason of the parameters that were not fitted."""
+        return self.problem.fixed
+
+    @property
+    def reference(self) -> Reference:
+        """Load and pressure of a0."""
+        return self.problem.reference
+
+    @property
+    def tire(self) -> Tire | None:
+        """Gives the half lengths, if any."""
+        return self.problem.tire
+
+    @property
+    def points(self) -> int:
+        """Number of points."""
+        return len(self.problem.data)
+
+    @property
+    def value(self) -> FloatArray:
+        """The fitted parameters in SI, shape (p,)."""
+        return self.problem.values_of(self.z)
+
+    @property
+    def std(self) -> FloatArray:
+        """Their standard deviations; infinite where the data do not hold a parameter."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)) * self.problem.slope_of(self.z))
 
     @property
     def values(self) -> dict[str, float]:
         """Every parameter, fitted or held."""
-        fitted = dict(zip(self.names, self.value.tolist(), strict=True))
-        return {**{name: value for name, (value, _) in self.held.items()}, **fitted}
+        return self.problem.at(self.z)
 
     @property
     def brush(self) -> BrushModel:
@@ -123,40 +147,27 @@ def fit_brush(
     if not names:
         raise ParameterError("brush fit: every parameter is held; leave one free")
     reference = Reference(float(np.median(data.load)), float(np.median(data.pressure)))
-    problem = BrushProblem(data, wanted, names, fixed, reference, ring_half(tire, data))
+    half = ring_half(tire, data)
+    problem = BrushProblem(data, wanted, names, fixed, reference, tire, half)
     z = problem.start()
     if len(data) > _START_POINTS:
         z = problem.take(np.arange(0, len(data), len(data) // _START_POINTS)).solve(z, None)
     for loss in (None,) if robust is None and len(wanted) == 1 else (None, robust, robust):
         z = problem.solve(z, loss)
         problem = replace(problem, scale=problem.misfit(z))
-    covariance_z = problem.covariance(z, robust)
-    value, slope = problem.values_of(z), problem.slope_of(z)
-    deviation = np.sqrt(np.diag(covariance_z))
-    with np.errstate(invalid="ignore"):
-        covariance = covariance_z * np.outer(slope, slope)
-    assumed = not tire and fixed.get("half_length", (0.0, ""))[1].startswith("assumed")
-    status = tuple(
-        _status(name, at, spread, assumed=assumed)
-        for name, at, spread in zip(names, value, deviation, strict=True)
-    )
+    covariance = problem.covariance(z, robust)
     found = problem.predicted(z)
     measured = {name: getattr(data, name) for name in wanted}
     error = {name: getattr(found, name) - measured[name] for name in wanted}
     return BrushFit(
-        names,
-        value,
-        deviation * slope,
+        problem,
+        z,
         covariance,
-        status,
-        fixed,
-        reference,
-        tire,
+        _status(problem, z, np.sqrt(np.diag(covariance))),
         {name: float(np.sqrt(np.nanmean(e**2))) for name, e in error.items()},
         {name: float(1.0 - np.nanvar(e) / np.nanvar(measured[name])) for name, e in error.items()},
         {name: float(np.nanmax(np.abs(m))) for name, m in measured.items()},
-        tuple(row for name, e in error.items() for row in band_errors(name, data, e)),
-        len(data),
+        {name: band_errors(data, e) for name, e in error.items()},
     )
 
 
@@ -238,25 +249,20 @@ def _choose(
             names.append(name)
         elif name == "half_length" and not ring:
             held[name] = (ASSUMED_HALF_LENGTH, reason)
-        elif name in NEUTRAL:
-            held[name] = (NEUTRAL[name], reason)
+        elif not SPECS[name].log:
+            held[name] = (0.0, reason)
     if "lateral_stiffness" not in (*names, *held):
         # braking alone: one stiffness for both directions
         names = ["lateral_stiffness", *(n for n in names if n != "longitudinal_stiffness")]
     return tuple(names), held
 
 
-def _status(name: str, value: float, spread: float, *, assumed: bool) -> str:
-    spec = SPECS[name]
-    room = 1e-3 * (np.log(spec.high / spec.low) if spec.log else spec.high - spec.low)
-    low, high = (
-        np.log([value / spec.low, spec.high / value])
-        if spec.log
-        else (value - spec.low, spec.high - value)
-    )
-    if min(low, high) < room:
-        return "at boundary"
-    stiffness = name in ("lateral_stiffness", "longitudinal_stiffness")
-    if not spread <= MOST_STD or (assumed and stiffness):
-        return "not identifiable from this campaign"
-    return "ok"
+def _status(problem: BrushProblem, z: FloatArray, deviation: FloatArray) -> tuple[str, ...]:
+    """Return what can be said of each parameter."""
+    low, high = problem.bounds
+    bound = np.minimum(z - low, high - z) < 1e-3 * (high - low)
+    known = deviation <= MOST_STD
+    if problem.fixed.get("half_length", (0.0, ""))[1].startswith("assumed"):
+        known &= ~np.isin(problem.names, ("lateral_stiffness", "longitudinal_stiffness"))
+    words = np.where(known, "ok", "not identifiable from this campaign")
+    return tuple(np.where(bound, "at boundary", words).tolist())

@@ -32,7 +32,8 @@ from tirelib.physics.brush.predict import (
 class Spec(NamedTuple):
     """A parameter: unit, allowed range, and the size by which its uncertainty is judged.
 
-    `log` parameters are fitted by their logarithm and judged by their own size.
+    `log` parameters are fitted by their logarithm and judged by their own size. Fits move a
+    coordinate z, the logarithm or the number over its size.
     """
 
     unit: str
@@ -40,6 +41,22 @@ class Spec(NamedTuple):
     high: float
     size: float
     log: bool = False
+
+    def value(self, z: FloatArray) -> FloatArray:
+        """Return the parameter at coordinates, SI."""
+        return np.asarray(np.exp(z) if self.log else z * self.size)
+
+    def z(self, value: float) -> float:
+        """Return the coordinate of the parameter."""
+        return float(np.log(value) if self.log else value / self.size)
+
+    def slope(self, value: float) -> float:
+        """Return the derivative of the parameter by its coordinate."""
+        return value if self.log else self.size
+
+    def moved(self, value: float, move: float) -> float:
+        """Return the parameter after a move of its coordinate."""
+        return value * float(np.exp(move)) if self.log else value + self.size * float(move)
 
 
 SPECS: Mapping[str, Spec] = MappingProxyType(
@@ -62,13 +79,10 @@ SPECS: Mapping[str, Spec] = MappingProxyType(
 )
 """Every number of the law; meanings in `tirelib.physics.brush.predict.PointParameters`.
 
+Those that are not fitted by their logarithm change nothing at zero.
+
 half_length is a0 at the reference load and pressure; load_power is n, pressure_power is m.
 """
-
-NEUTRAL: Mapping[str, float] = MappingProxyType(
-    {name: 0.0 for name, spec in SPECS.items() if not spec.log}
-)
-"""Values that change nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,16 +114,15 @@ def point_parameters(
         raise ParameterError(
             f"brush law: {unknown[0]!r} is no parameter; allowed are {', '.join(SPECS)}"
         )
-    half = half_length
+    half, power = half_length, values.get("pressure_power", 0.0)
     if half is None:
         half = values["half_length"] * (data.load / reference.load) ** values.get("load_power", 0.0)
-        power = values.get("pressure_power", 0.0)
+        if power != 0.0 and not np.isfinite(data.pressure).all():
+            raise ParameterError(
+                "brush law: pressure_power is given but the pressure is not known at all points; "
+                "record it, or leave pressure_power out"
+            )
         if power != 0.0:
-            if not np.isfinite(data.pressure).all():
-                raise ParameterError(
-                    "brush law: pressure_power is given but the pressure is not known at all "
-                    "points; record it, or leave pressure_power out"
-                )
             half = half * (data.pressure / reference.pressure) ** power
     law = ("half_length", "load_power", "pressure_power")
     return PointParameters(
@@ -139,7 +152,6 @@ STORED: Mapping[str, str] = MappingProxyType(
     }
 )
 """Name in a file of each parameter of the law; the carcass stands there as a stiffness."""
-NEEDED = ("lateral_stiffness", "friction")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,12 +176,6 @@ class BrushModel:
     reference: Reference
     tire: Tire | None
 
-    def half_length(self, data: ForceData) -> FloatArray:
-        """Return half the contact length at the points, shape (n,), [m]."""
-        return np.broadcast_to(
-            np.asarray(self.parameters(data).half_length, dtype=np.float64), (len(data),)
-        )
-
     def parameters(self, data: ForceData) -> PointParameters:
         """Return the brush at the points of data.
 
@@ -193,7 +199,7 @@ def brush_of(file: TireFile) -> BrushModel:
     CalibrationError
         If the file states no bristles or no friction, or neither a half length nor a ring.
     """
-    missing = [STORED[name] for name in NEEDED if STORED[name] not in file.numbers]
+    missing = [name for name in ("bristle_lateral", "friction") if name not in file.numbers]
     if missing:
         raise CalibrationError(
             f"model {file.name} states no {' and no '.join(missing)}: it says nothing about "

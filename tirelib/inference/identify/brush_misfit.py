@@ -13,7 +13,7 @@ The brush bends at zero slip: its force is quadratic in the size of the slip. An
 not, so the misfit is also taken about a curve without that bend, and the likelier one counts.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import NamedTuple
@@ -22,14 +22,14 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from tirelib.core.arrays import FloatArray
-from tirelib.inference.identify.brush_cells import CellConditions, Cells
+from tirelib.inference.identify.brush_cells import Cells
 
 LENGTHS = (0.5, 1.0, 2.0)
 """Over the slip, in units of the slip at which the whole contact slides."""
 LOAD_LENGTHS = (0.3, 1.0)
 """Over the logarithms of load and pressure."""
-SHARES = (0.0, 0.5, 0.9, 0.99, 0.999)
-"""Shares of the misfit's variance that are tried as its smooth part."""
+SHARES = (0.5, 0.9, 0.99, 0.999)
+"""Shares of the misfit's variance that are tried as its smooth part, beside none."""
 EVEN = 0.1
 CAMBER_LENGTH = 0.1
 FEWEST_FREEDOMS = 3
@@ -44,7 +44,7 @@ FREE = 5.0
 class Term(NamedTuple):
     """A multiple of the misfit of one force at one place, forces over their scale.
 
-    The place is a tuple in the order of `CellConditions`.
+    The place is a column of `tirelib.inference.identify.brush_cells.places`.
     """
 
     force: str
@@ -52,15 +52,8 @@ class Term(NamedTuple):
     factor: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Shape:
-    """Lengths of one force's misfit.
-
-    Attributes
-    ----------
-    share : float
-        Smooth part of the variance.
-    """
+class Shape(NamedTuple):
+    """Lengths of one force's misfit over slip and load, and the smooth share of its variance."""
 
     slip: float
     load: float
@@ -159,9 +152,10 @@ class Misfit:
         owner = [q for q, row in enumerate(terms) for t in row if t.force == cells.force]
         factor = np.zeros((len(terms), len(places)))
         factor[owner, np.arange(len(places))] = [t.factor for t in places]
-        every = each.variance * kernel(cells.force, shape, _joined(cells.at, places), self.load)
+        at = np.column_stack([cells.at, *(term.place for term in places)])
+        every = each.variance * kernel(cells.force, shape, at, self.load)
         smooth = shape.share * every
-        scatter = each.variance * (1.0 - shape.share) * (cells.at.load / self.load) ** 2
+        scatter = each.variance * (1.0 - shape.share) * (cells.at[0] / self.load) ** 2
         K = smooth[:n, :n] + np.diag(scatter)
         root = cho_factor(K + (_FLOOR * np.trace(K) / n + _TINY) * np.eye(n), lower=True)
         cross = factor @ smooth[n:, :n]
@@ -183,35 +177,31 @@ def misfit_of(
     return Misfit(tuple(_told(each, load) for each in cells), load, pressure)
 
 
-def kernel(force: str, shape: Shape, at: CellConditions, load: float) -> FloatArray:
-    """Return the covariance of the smooth misfit over places, variance 1 far out, shape (m, m)."""
-    own, other = at.slip_angle / at.slide_angle, at.slip_ratio / at.slide_ratio
+def kernel(force: str, shape: Shape, at: FloatArray, load: float) -> FloatArray:
+    """Return the covariance of the smooth misfit over places, variance 1 far out, shape (m, m).
+
+    Places (7, m) are `tirelib.inference.identify.brush_cells.places`; the reference load is [N].
+    """
+    loads, pressure, angle, ratio, camber, slide_angle, slide_ratio = at
+    own, other = angle / slide_angle, ratio / slide_ratio
     if force == "Fx":
         own, other = other, own
     near, mirrored = _rough(own, own, shape.slip), _rough(own, -own, shape.slip)
     parity = 0.5 * (1.0 + EVEN) * near - 0.5 * (1.0 - EVEN) * mirrored
-    spread = _bell(np.log(at.load), np.log(at.load), shape.load)
-    spread = spread * _bell(np.log(at.pressure), np.log(at.pressure), shape.load)
-    spread = spread * _bell(at.camber, at.camber, CAMBER_LENGTH)
-    spread = spread * _rough(other, other, shape.slip)
-    size = (at.load / load) ** (1.5 if force == "Mz" else 1.0)
+    spread = _bell(np.log(loads), shape.load) * _bell(np.log(pressure), shape.load)
+    spread = spread * _bell(camber, CAMBER_LENGTH) * _rough(other, other, shape.slip)
+    size = (loads / load) ** (1.5 if force == "Mz" else 1.0)
     return np.asarray(2.0 * parity * spread * np.outer(size, size))
 
 
-def _bell(a: FloatArray, b: FloatArray, length: float) -> FloatArray:
-    return np.asarray(np.exp(-0.5 * ((a[:, None] - b[None, :]) / length) ** 2))
+def _bell(a: FloatArray, length: float) -> FloatArray:
+    return np.asarray(np.exp(-0.5 * ((a[:, None] - a) / length) ** 2))
 
 
 def _rough(a: FloatArray, b: FloatArray, length: float) -> FloatArray:
     """Return Matern's covariance of order 3/2: once differentiable, as the brush is at zero."""
-    far = np.sqrt(3.0) * np.abs(a[:, None] - b[None, :]) / length
+    far = np.sqrt(3.0) * np.abs(a[:, None] - b) / length
     return np.asarray((1.0 + far) * np.exp(-far))
-
-
-def _grid() -> Iterator[Shape]:
-    yield Shape(LENGTHS[0], LOAD_LENGTHS[0], 0.0)
-    for slip, load, share in product(LENGTHS, LOAD_LENGTHS, SHARES[1:]):
-        yield Shape(slip, load, share)
 
 
 def _told(cells: Cells, load: float) -> ForceMisfit:
@@ -219,17 +209,18 @@ def _told(cells: Cells, load: float) -> ForceMisfit:
     take = np.arange(cells.misfit.size)
     if take.size > _MOST_FOR_LENGTHS:
         take = np.random.default_rng(0).permutation(take)[:_MOST_FOR_LENGTHS]
-    at = cells.at.mapped(lambda values: values[take])
+    at = cells.at[:, take]
     left, size, _ = np.linalg.svd(cells.slope[take], full_matrices=True)
     rank = int((size > 1e-7 * size[0]).sum()) if size.size else 0
     rest = left[:, rank:].T
     misfit = rest @ cells.misfit[take]
     freedom = misfit.size
-    shapes = tuple(_grid())
+    shapes = [Shape(LENGTHS[0], LOAD_LENGTHS[0], 0.0)]
+    shapes += [Shape(*each) for each in product(LENGTHS, LOAD_LENGTHS, SHARES)]
     if freedom < FEWEST_FREEDOMS:
         return ForceMisfit(cells, shapes[0], float("inf"), freedom, 0.0)
     score, variance = np.empty(len(shapes)), np.empty(len(shapes))
-    scatter = rest @ ((at.load / load)[:, None] ** 2 * rest.T)
+    scatter = rest @ ((at[0] / load)[:, None] ** 2 * rest.T)
     for i, shape in enumerate(shapes):
         smooth = rest @ kernel(cells.force, shape, at, load) @ rest.T
         K = shape.share * smooth + (1.0 - shape.share) * scatter
@@ -240,10 +231,3 @@ def _told(cells: Cells, load: float) -> ForceMisfit:
     best = int(np.argmax(score))
     evidence = float(score[best] + np.log(np.mean(np.exp(score - score[best]))))
     return ForceMisfit(cells, shapes[best], float(variance[best]), freedom, evidence)
-
-
-def _joined(at: CellConditions, terms: Sequence[Term]) -> CellConditions:
-    names = CellConditions.__slots__
-    more = np.array([term.place for term in terms]).reshape(len(terms), len(names)).T
-    here = [getattr(at, name) for name in names]
-    return CellConditions(*map(np.concatenate, zip(here, more, strict=True)))

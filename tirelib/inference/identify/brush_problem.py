@@ -7,6 +7,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.parameters import Tire
 from tirelib.inference.identify.brush_law import SPECS, Reference, Spec, predict
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.physics.brush.predict import PointForces
@@ -32,6 +33,7 @@ class BrushProblem:
     names: tuple[str, ...]
     fixed: Mapping[str, tuple[float, str]]
     reference: Reference
+    tire: Tire | None  # its ring gives the half length of the contact, if any
     half: FloatArray | None
     scale: FloatArray | None = None  # of each force
 
@@ -62,7 +64,7 @@ class BrushProblem:
             "lateral_compliance": 2e-6,
         }
         value = np.array([start.get(name, 0.0) for name in self.names])
-        low, high = self._bounds()
+        low, high = self.bounds
         return np.clip(self.z_of(value), low + 1e-6, high - 1e-6)
 
     def at(self, z: FloatArray) -> dict[str, float]:
@@ -84,7 +86,7 @@ class BrushProblem:
     def jacobian(self, z: FloatArray) -> FloatArray:
         """Return its derivative, shape (n_forces * n, p), by differences into the range."""
         here = self.residual(z)
-        _, high = self._bounds()
+        _, high = self.bounds
         columns = []
         for k in range(z.size):
             step = np.zeros_like(z)
@@ -102,7 +104,7 @@ class BrushProblem:
             residual,
             z,
             self.jacobian,
-            bounds=self._bounds(),
+            bounds=self.bounds,
             loss="linear" if robust is None else "huber",
             f_scale=1.0 if robust is None else robust,
             xtol=1e-10,
@@ -156,24 +158,23 @@ class BrushProblem:
 
     def values_of(self, z: FloatArray) -> FloatArray:
         """Return the parameters in SI."""
-        pairs = zip(self._specs, z, strict=True)
-        return np.array([float(np.exp(at)) if s.log else float(at * s.size) for s, at in pairs])
+        return np.array([float(s.value(at)) for s, at in zip(self._specs, z, strict=True)])
 
     def slope_of(self, z: FloatArray) -> FloatArray:
         """Return their derivative by z."""
-        pairs = zip(self._specs, self.values_of(z), strict=True)
-        return np.array([v if s.log else s.size for s, v in pairs])
+        return np.array([s.slope(v) for s, v in zip(self._specs, self.values_of(z), strict=True)])
 
     def z_of(self, value: FloatArray) -> FloatArray:
         """Return z of parameters in SI."""
-        pairs = zip(self._specs, value, strict=True)
-        return np.array([np.log(v) if s.log else v / s.size for s, v in pairs])
+        return np.array([s.z(v) for s, v in zip(self._specs, value, strict=True)])
 
     @property
     def _specs(self) -> list[Spec]:
         return [SPECS[name] for name in self.names]
 
-    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """The ends of z."""
         low, high = np.array([(spec.low, spec.high) for spec in self._specs]).T
         return self.z_of(low), self.z_of(high)
 

@@ -4,7 +4,7 @@ That is its own slope at zero slip, largest force and trail.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import stdtrit
@@ -13,9 +13,7 @@ from tirelib.core.arrays import FloatArray
 from tirelib.inference.identify.brush_cells import cells_of, slip_stiffnesses
 from tirelib.inference.identify.brush_fit import BrushFit
 from tirelib.inference.identify.brush_misfit import Misfit, Term, misfit_of
-from tirelib.inference.identify.brush_problem import ROBUST, BrushProblem
 from tirelib.inference.identify.force_data import ForceData
-from tirelib.inference.identify.ring_patch import ring_half
 
 NEAR_ZERO = 0.01
 """Slip, in units of full sliding, between whose signs the slope at zero is taken."""
@@ -23,12 +21,17 @@ NEAR_ZERO = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Study:
-    """A solved problem with its misfit: what intervals and advice are computed from."""
+    """A fit with its misfit: what intervals and advice are computed from.
+
+    Attributes
+    ----------
+    misfits : tuple of Misfit
+        About the brush, and about the curve without a bend.
+    stiffness : mapping of slip to float
+        2 c a^2 at the reference, [N/rad] and [N].
+    """
 
     fit: BrushFit
-    problem: BrushProblem
-    z: FloatArray
-    covariance: FloatArray
     misfits: tuple[Misfit, ...]
     stiffness: Mapping[str, float]
 
@@ -48,7 +51,7 @@ class Study:
 
     def scale_of(self, force: str) -> float | None:
         """Return the scale of a force; None if it was not fitted."""
-        forces, scale = self.problem.forces, self.problem.scale
+        forces, scale = self.fit.problem.forces, self.fit.problem.scale
         if force not in forces or scale is None:
             return None
         return float(scale[forces.index(force)])
@@ -59,29 +62,24 @@ class Study:
         return float(stdtrit(max(self.misfit.freedom, 1), 0.975))
 
 
-def study_of(fit: BrushFit, data: ForceData) -> Study:
-    """Return the study of a fit to data."""
-    half = ring_half(fit.tire, data)
-    problem = BrushProblem(data, tuple(fit.rmse), fit.names, fit.held, fit.reference, half)
-    z = problem.z_of(fit.value)
-    problem = replace(problem, scale=problem.misfit(z))
+def study_of(fit: BrushFit) -> Study:
+    """Return the study of a fit."""
     stiffness = stiffness_at(fit, np.array([fit.reference.load]))
     at_zero = {name: float(value[0]) for name, value in stiffness.items()}
-    cells = cells_of(problem, z)
+    cells = cells_of(fit.problem, fit.z)
     pressure = known_pressure(fit.reference.pressure)
     misfits = tuple(
         misfit_of(cells, fit.reference.load, pressure, smooth=smooth) for smooth in (False, True)
     )
-    return Study(fit, problem, z, problem.covariance(z, ROBUST), misfits, at_zero)
+    return Study(fit, misfits, at_zero)
 
 
 def stiffness_at(
     fit: BrushFit, load: FloatArray, pressure: FloatArray | None = None
 ) -> dict[str, FloatArray]:
     """Return 2 c a^2 over slip angle [N/rad] and slip ratio [N], shapes as the load's."""
-    zero, none = np.zeros_like(load), np.full_like(load, np.nan)
     where = np.full_like(load, fit.reference.pressure) if pressure is None else pressure
-    data = ForceData(load, where, zero, zero, zero, none, none, none, none, zero.astype(np.int64))
+    data = ForceData(load, where, np.zeros_like(load))
     across, along = slip_stiffnesses(fit.brush.parameters(data))
     return {"slip_angle": across, "slip_ratio": along}
 
@@ -95,7 +93,6 @@ def property_terms(study: Study, name: str) -> list[Term]:
     """Return what the tire's own property has beyond the best brush, for the parameter's z."""
     load, pressure = study.misfit.load, study.misfit.pressure
     forces = set(study.fit.rmse)
-    fitted = set(study.fit.names)
     side = "slip_angle" if "Fy" in forces else "slip_ratio"
 
     def slope(slip: str, factor: float) -> list[Term]:
@@ -103,11 +100,16 @@ def property_terms(study: Study, name: str) -> list[Term]:
 
     def length(factor: float) -> list[Term]:
         """Return ln a = ln 3 + ln (slope of Mz) - ln C."""
-        return [*_trail_terms(study, factor), *slope("slip_angle", -factor)]
+        slide = study.slide["slip_angle"]
+        moment = study.stiffness["slip_angle"] * study.fit.values["half_length"] / 3.0
+        trail = _pair(study, "Mz", (load, pressure), "slip_angle", slide, NEAR_ZERO, moment, factor)
+        return [*trail, *slope("slip_angle", -factor)]
 
-    has_length = "half_length" in fitted and {"Fy", "Mz"} <= forces
+    has_length = "half_length" in study.fit.names and {"Fy", "Mz"} <= forces
     if name == "friction":
-        return _peak_terms(study, side)
+        force, slide = "Fy" if side == "slip_angle" else "Fx", study.slide[side]
+        each = study.fit.values["friction"] * load / slide
+        return _pair(study, force, (load, pressure), side, slide, 1.0, each)
     if name == "half_length" and has_length:
         return length(1.0)
     if name in ("lateral_stiffness", "longitudinal_stiffness"):
@@ -121,51 +123,35 @@ def slope_terms(
     study: Study, slip: str, factor: float, load: float, pressure: float, size: float
 ) -> list[Term]:
     """Return factor times the change of ln C by the misfit's slope at zero slip."""
-    force = "Fy" if slip == "slip_angle" else "Fx"
-    scale = study.scale_of(force)
-    if scale is None:
-        return []
-    sign = -1.0 if force == "Fy" else 1.0
     slide = 3.0 * study.fit.values["friction"] * load / size
-    h = NEAR_ZERO * slide
-    each = sign * factor * scale / (2.0 * h * size)
-    where = known_pressure(pressure)
-    return _pair(force, load, where, slip, slide, h, each)
-
-
-def _trail_terms(study: Study, factor: float) -> list[Term]:
-    """Return factor times the change of ln (slope of Mz at zero slip)."""
-    scale = study.scale_of("Mz")
-    if scale is None:
-        return []
-    size = study.stiffness["slip_angle"] * study.fit.values["half_length"] / 3.0
-    slide = study.slide["slip_angle"]
-    h = NEAR_ZERO * slide
-    load, pressure, each = study.misfit.load, study.misfit.pressure, factor * scale / (2 * h * size)
-    return _pair("Mz", load, pressure, "slip_angle", slide, h, each)
-
-
-def _peak_terms(study: Study, slip: str) -> list[Term]:
-    """Return the change of ln mu by the misfit where the whole contact slides."""
-    force = "Fy" if slip == "slip_angle" else "Fx"
-    scale = study.scale_of(force)
-    if scale is None:
-        return []
-    sign = -1.0 if force == "Fy" else 1.0
-    load, pressure = study.misfit.load, study.misfit.pressure
-    each = 0.5 * sign * scale / (study.fit.values["friction"] * load)
-    far = study.slide[slip]
-    return _pair(force, load, pressure, slip, far, far, each)
+    force, at = "Fy" if slip == "slip_angle" else "Fx", (load, known_pressure(pressure))
+    return _pair(study, force, at, slip, slide, NEAR_ZERO, size, factor)
 
 
 def _pair(
-    force: str, load: float, pressure: float, slip: str, slide: float, at: float, factor: float
+    study: Study,
+    force: str,
+    at: tuple[float, float],
+    slip: str,
+    slide: float,
+    share: float,
+    slope: float,
+    factor: float = 1.0,
 ) -> list[Term]:
-    """Return the difference of the misfit at a slip and at its opposite, times a factor."""
+    """Return the change of the logarithm of a slope over the slip by the misfit, times a factor.
 
-    def place(at: float) -> tuple[float, ...]:
+    The slope is a force's between two slips of opposite sign, at a share of that at which all
+    slides, and at a load and pressure. Nothing is returned for a force that was not fitted.
+    """
+    scale = study.scale_of(force)
+    if scale is None:
+        return []
+    reach, sign = share * slide, -1.0 if force == "Fy" else 1.0
+    each = sign * factor * scale / (2.0 * reach * slope)
+
+    def place(slip_there: float) -> tuple[float, ...]:
         if slip == "slip_angle":
-            return load, pressure, at, 0.0, 0.0, slide, 1.0
-        return load, pressure, 0.0, at, 0.0, 1.0, slide
+            return *at, slip_there, 0.0, 0.0, slide, 1.0
+        return *at, 0.0, slip_there, 0.0, 1.0, slide
 
-    return [Term(force, place(s * at), s * factor) for s in (1.0, -1.0)]
+    return [Term(force, place(s * reach), s * each) for s in (1.0, -1.0)]

@@ -1,5 +1,6 @@
 """From a campaign's waveforms to what a fit needs, with every reason why it cannot be done."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,16 +23,6 @@ from tirelib.inference.identify.strain_notes import (
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID, Waveforms
 from tirelib.model.base import operating_points
-
-__all__ = [
-    "LEAST_RUNS",
-    "Data",
-    "StraightRuns",
-    "straight_noise",
-    "straight_runs",
-    "usable",
-    "working_gages",
-]
 
 TYPICAL_TOLERANCE = Tolerance(0.005, 0.002, 0.001, 0.003)
 """Tolerance of set points, where a campaign does not say its own."""
@@ -178,19 +169,11 @@ def straight_runs(waves: Waveforms) -> StraightRuns:
             "separated; add a run at another load"
         )
     _refuse_geometry(chosen)
-    _refuse_conditions(chosen)
+    _refuse(chosen, _conditions(chosen))
     gages = working_gages(chosen)
     strain = chosen.strain[:, gages].mean(axis=1)
-    _refuse_signs(chosen, strain)
-    radius = chosen.header.tire.free_radius
-    deflection = radius - chosen.conditions["loaded_radius"]
-    _refuse(
-        chosen,
-        np.isfinite(deflection) & ((deflection <= 0) | (deflection > 0.3 * radius)),
-        1e3 * chosen.conditions["loaded_radius"],
-        f"loaded radius {{:.1f}} mm with a free radius of {1e3 * radius:.1f} mm; it has to be "
-        "smaller, by less than 30 %; correct tire.free_radius_m or the channel",
-    )
+    deflection = chosen.header.tire.free_radius - chosen.conditions["loaded_radius"]
+    _refuse(chosen, _shapes(chosen, strain, deflection))
     return StraightRuns(chosen, strain, gages, straight_noise(chosen, strain), deflection)
 
 
@@ -203,12 +186,7 @@ def usable(waves: Waveforms) -> BoolArray:
 def straight_noise(waves: Waveforms, strain: FloatArray) -> RepeatNoise:
     """Return the noise of straight runs from their repeats: of the data alone, whatever the model.
 
-    Parameters
-    ----------
-    waves : Waveforms
-        Waveforms of straight runs.
-    strain : shape (n_runs, n_phi), [-]
-        Mean over the gages in use.
+    The strain (n_runs, n_phi), [-], is the mean over the gages in use.
     """
     return repeat_noise(strain, waves.group, measured_tangents(waves, strain))
 
@@ -256,25 +234,29 @@ def _refuse_geometry(waves: Waveforms) -> None:
         )
 
 
-def _refuse(waves: Waveforms, wrong: BoolArray, value: FloatArray, words: str) -> None:
-    """Raise for the first run that is wrong, in words with the place of its value."""
-    if wrong.any():
-        first = int(np.argmax(wrong))
-        raise CalibrationError(
-            f"{waves.header.name}, run {waves.run[first]}: {words.format(value[first])}"
-        )
+Checks = Iterator[tuple[BoolArray, FloatArray, str]]
+"""Which runs are wrong, a value of each, and the words with the place of the value."""
 
 
-def _refuse_conditions(waves: Waveforms) -> None:
-    """Raise for the first run whose load, inflation pressure or turn rate no rolling ring has."""
+def _refuse(waves: Waveforms, checks: Checks) -> None:
+    """Raise for the first run that is wrong by the first check that finds one."""
+    for wrong, value, words in checks:
+        if wrong.any():
+            first = int(np.argmax(wrong))
+            raise CalibrationError(
+                f"{waves.header.name}, run {waves.run[first]}: {words.format(value[first])}"
+            )
+
+
+def _conditions(waves: Waveforms) -> Checks:
+    """Tell runs whose load, inflation pressure or turn rate no rolling ring has."""
     for name, least, unit, factor, words in (
         ("Fz", 10.0, "N", 1.0, "the sign or the unit"),
         ("pressure", 1e4, "bar", 1e-5, "the channel or its unit"),
         ("omega", 0.1, "rad/s", 1.0, "the channel or its unit"),
     ):
         value = waves.conditions[name]
-        _refuse(
-            waves,
+        yield (
             value < least,
             factor * value,
             f"{name} is {{:.4g}} {unit}; at least {factor * least:g} {unit} is allowed for a "
@@ -282,21 +264,26 @@ def _refuse_conditions(waves: Waveforms) -> None:
         )
 
 
-def _refuse_signs(waves: Waveforms, strain: FloatArray) -> None:
-    """Raise for the first run whose innerliner is torn, or not stretched in the contact."""
+def _shapes(waves: Waveforms, strain: FloatArray, deflection: FloatArray) -> Checks:
+    """Tell runs whose innerliner is torn or not stretched in the contact, or that stand too low."""
     size = np.sqrt(np.mean(strain**2, axis=1))
-    _refuse(
-        waves,
+    yield (
         size > MOST_STRAIN,
         1e6 * size,
         f"{{:.3g}} microstrain rms; at most {1e6 * MOST_STRAIN:.0f} is allowed; correct the unit "
         "of the gages",
     )
     middle = strain[:, np.abs(GRID) < MIDDLE].mean(axis=1)
-    _refuse(
-        waves,
+    yield (
         middle <= 0.0,
         1e6 * middle,
         "{:.0f} microstrain below the axle, against the mean of the turn; the belt is bent flat "
         "there and its inside stretched, tension is positive; correct the sign of the gages",
+    )
+    radius = waves.header.tire.free_radius
+    yield (
+        np.isfinite(deflection) & ((deflection <= 0) | (deflection > 0.3 * radius)),
+        1e3 * waves.conditions["loaded_radius"],
+        f"loaded radius {{:.1f}} mm with a free radius of {1e3 * radius:.1f} mm; it has to be "
+        "smaller, by less than 30 %; correct tire.free_radius_m or the channel",
     )

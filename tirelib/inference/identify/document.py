@@ -1,6 +1,5 @@
 """An identification as JSON (``tirelib-identification/1``), in the units of a tire file."""
 
-from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
@@ -17,7 +16,7 @@ from tirelib.inference.identify.error_bands import BandError
 from tirelib.inference.identify.estimate import Estimate
 from tirelib.inference.identify.forces import ForceIdentification
 from tirelib.inference.identify.identify import Identification
-from tirelib.inference.identify.lateral_force import PressureBand, PressureComparison
+from tirelib.inference.identify.lateral_force import PressureBand
 from tirelib.inference.identify.whole import Whole
 from tirelib.physics.ring.frequencies import rim_stiffness
 
@@ -28,6 +27,11 @@ _DEG = float(np.pi / 180.0)
 def whole_document(campaign: Campaign, whole: Whole) -> dict[str, Any]:
     """Return ring and brush; what the campaign does not tell is null or empty."""
     brush, comparison = whole.brush, whole.brush and whole.brush.comparison
+    lateral = comparison and {  # by the ring's pressure against the parabola, Fig. 6-38 to 6-42
+        "unit": "N",
+        "stiffness": "each load and pressure its own",
+        "table": [_band(row) for row in comparison.table],
+    }
     return {
         "format": FORMAT,
         "campaign": campaign.header.name,
@@ -38,7 +42,7 @@ def whole_document(campaign: Campaign, whole: Whole) -> dict[str, Any]:
         "reasons": list(whole.reasons),
         "brush": brush and _brush(brush),
         "forces": brush and _forces(brush),
-        "ring_pressure": comparison and _pressure(comparison),
+        "ring_pressure": lateral,
     }
 
 
@@ -62,7 +66,7 @@ def _ring(found: Identification | None) -> dict[str, Any]:
         "rms_ustrain": 1e6 * fit.rms,
         "delay_us": 1e6 * fit.delay,
         "strain_rms_ustrain": 1e6 * float(np.sqrt(np.mean(runs.strain**2))),
-        "parameters": [_ring_parameter(each) for each in found.estimates],
+        "parameters": [_parameter(each) for each in found.estimates],
         "correlation": found.correlation,
         "vertical_stiffness": _vertical_stiffness(found),
         "rim_stiffness": _rim_stiffness(found),
@@ -70,35 +74,34 @@ def _ring(found: Identification | None) -> dict[str, Any]:
     }
 
 
-def _parameter(
-    each: Estimate, stored: str, edge: Callable[[float], float], scale: float
-) -> dict[str, Any]:
-    """Return a number in the unit of a tire file.
-
-    `edge` gives that of its SI value, and `scale` is the factor for deviations.
-    """
-    low, high = sorted((edge(each.low), edge(each.high)))
+def _parameter(each: Estimate) -> dict[str, Any]:
+    """Return a number of ring or brush in the unit of a tire file."""
+    stored = STORED.get(each.name, each.name)
+    field = NUMBERS[stored]
+    low, high = sorted((_edge(each.name, each.low), _edge(each.name, each.high)))
+    scale = abs(float(from_si(1.0, field.unit, field.dimension)))
+    if each.name == "lateral_compliance":  # a file has its inverse
+        scale /= each.value**2 or np.nan
     return {
         "name": stored,
-        "meaning": NUMBERS[stored].meaning,
-        "value": edge(each.value),
+        "meaning": field.meaning,
+        "value": _edge(each.name, each.value),
         "std": scale * each.std,
         "low": low,
         "high": high,
         "fit_std": scale * each.fit_std,
-        "unit": NUMBERS[stored].unit,
+        "unit": field.unit,
         "flags": list(each.flags),
         "helps": each.helps,
     }
 
 
-def _ring_parameter(each: Estimate) -> dict[str, Any]:
-    field = NUMBERS[each.name]
-
-    def edge(value: float) -> float:
-        return float(from_si(value, field.unit, field.dimension))
-
-    return _parameter(each, each.name, edge, abs(edge(1.0)))
+def _edge(name: str, value: float) -> float:
+    """Return a number of ring or brush in the unit of its number in a file."""
+    field = NUMBERS[STORED.get(name, name)]
+    if name == "lateral_compliance":
+        value = 1.0 / value if value > 0.0 else float("inf")
+    return float(from_si(value, field.unit, field.dimension))
 
 
 def _vertical_stiffness(found: Identification) -> dict[str, float | None]:
@@ -135,7 +138,7 @@ def _brush(found: ForceIdentification) -> dict[str, Any]:
     fit = found.fit
     deviation = np.sqrt(np.diag(fit.covariance))
     with np.errstate(invalid="ignore"):
-        correlation = fit.covariance / np.outer(deviation, deviation)
+        correlation = fit.covariance / np.outer(deviation, deviation)  # of z as of the values
     source = "ring" if fit.tire is not None else "Mz" if "half_length" in fit.names else "assumed"
     return {
         "reference": {
@@ -143,7 +146,10 @@ def _brush(found: ForceIdentification) -> dict[str, Any]:
             "pressure_bar": 1e-5 * fit.reference.pressure,
         },
         "half_length_from": source,
-        "parameters": [_brush_parameter(each) for each in found.estimates],
+        "parameters": [
+            told | {"interval": [told["low"], told["high"]]}
+            for told in map(_parameter, found.estimates)
+        ],
         "correlation": correlation,
         "held": [
             {
@@ -158,21 +164,6 @@ def _brush(found: ForceIdentification) -> dict[str, Any]:
         "stiffness": [_stiffness(each) for each in found.stiffness],
         "notes": list(found.notes),
     }
-
-
-def _brush_parameter(each: Estimate) -> dict[str, Any]:
-    step = 1e-6 * abs(each.value) or 1e-6
-    rate = abs(_edge(each.name, each.value + step) - _edge(each.name, each.value)) / step
-    told = _parameter(each, STORED[each.name], lambda value: _edge(each.name, value), rate)
-    return told | {"interval": [told["low"], told["high"]]}
-
-
-def _edge(name: str, value: float) -> float:
-    """Return a parameter of the law in the unit of its number in a file."""
-    field = NUMBERS[STORED[name]]
-    if name == "lateral_compliance":
-        value = 1.0 / value if value > 0.0 else float("inf")
-    return float(from_si(value, field.unit, field.dimension))
 
 
 def _stiffness(each: SlipStiffness) -> dict[str, Any]:
@@ -198,24 +189,17 @@ def _forces(found: ForceIdentification) -> dict[str, Any]:
                 "rmse_percent_of_peak": 100.0 * rmse / fit.peak[name],
                 "r2": fit.r2[name],
                 "peak": fit.peak[name],
-                "bands": [_band(row) for row in fit.errors if row.force == name],
+                "bands": [_band(row) for row in fit.errors[name]],
             }
             for name, rmse in fit.rmse.items()
         },
     }
 
 
-def _pressure(found: PressureComparison) -> dict[str, Any]:
-    """Return lateral force by the ring's pressure against the parabola (Fig. 6-38 to 6-42), [N]."""
-    table = [_band(row) for row in found.table]
-    return {"unit": "N", "stiffness": "each load and pressure its own", "table": table}
-
-
 def _band(row: BandError | PressureBand) -> dict[str, Any]:
     """Return the errors of a band, its range in engineers' units."""
     told = asdict(row)
     by, low, high = (told.pop(name) for name in ("by", "low", "high"))
-    told.pop("force", None)
     quantity = QUANTITIES.get(by)
     if quantity is None:
         return {"by": by, "low": low, "high": high, "range_unit": "", **told}

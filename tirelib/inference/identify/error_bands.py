@@ -35,9 +35,8 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class BandError:
-    """Error of one force over one band: root mean square, and mean (prediction less measured)."""
+    """Error of a force over one band: root mean square, and mean (prediction less measured)."""
 
-    force: str
     by: str
     low: float
     high: float
@@ -86,23 +85,26 @@ def levels(values: FloatArray) -> IntArray:
     return number
 
 
-def cells_of_load(data: ForceData) -> IntArray:
-    """Return the number of each point's load and pressure, from 0."""
-    pair = np.stack([levels(data.load), levels(data.pressure)])
-    number = np.unique(pair, axis=1, return_inverse=True)[1]
+def numbered(*rows: FloatArray | IntArray) -> IntArray:
+    """Return the number of each point's combination of values, rows of shape (n,), from 0."""
+    number = np.unique(np.stack(rows), axis=1, return_inverse=True)[1]
     return np.asarray(number, dtype=np.int64).ravel()
 
 
-def band_errors(force: str, data: ForceData, error: FloatArray) -> tuple[BandError, ...]:
+def cells_of_load(data: ForceData) -> IntArray:
+    """Return the number of each point's load and pressure, from 0."""
+    return numbered(levels(data.load), levels(data.pressure))
+
+
+def band_errors(data: ForceData, error: FloatArray) -> tuple[BandError, ...]:
     """Return the error of a force by band; points without a measurement are NaN in `error`."""
     out = []
     for band in bands(data):
         part = error[band.member & np.isfinite(error)]
         if part.size:
             rms = float(np.sqrt(np.mean(part**2)))
-            out.append(
-                BandError(force, band.by, band.low, band.high, part.size, rms, float(part.mean()))
-            )
+            bias = float(part.mean())
+            out.append(BandError(band.by, band.low, band.high, part.size, rms, bias))
     return tuple(out)
 
 

@@ -1,6 +1,7 @@
 """Forces and their conditions from campaigns: run means of steady runs, samples of sweeps."""
 
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +18,17 @@ TEMPERATURES = ("tread_temperature", "temperature", "tire_temperature")
 """Channels that tell the tread's temperature; the first that was recorded counts."""
 BLOCK = 10.0
 """Stretch of a sweep over which errors are taken to go together, [s]."""
-_UNKNOWN: FloatArray = np.empty(0)
+_ABSENT: FloatArray = np.empty(0)
+"""Stands for a field that is not given."""
+
+
+def _absent() -> Any:
+    return _ABSENT
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForceData:
-    """Points with forces; arrays of shape (n,), SI, ISO.
+    """Points with forces; arrays of shape (n,), SI, ISO; what is not given is zero or unknown.
 
     Attributes
     ----------
@@ -32,7 +38,8 @@ class ForceData:
     Fx, Fy, Mz : [N], [N], [N m]
         NaN where not recorded.
     block : array of int
-        Points of one run, or of one stretch of a sweep: their errors may go together.
+        Points of one run, or of one stretch of a sweep: their errors may go together. By default
+        each point has a block of its own.
     speed, temperature, time : [m/s], [K], [s]
         Speed of the road, temperature of the tread, time since the campaign began; NaN if unknown.
     """
@@ -40,21 +47,22 @@ class ForceData:
     load: FloatArray
     pressure: FloatArray
     slip_angle: FloatArray
-    slip_ratio: FloatArray
-    camber: FloatArray
-    omega: FloatArray
-    Fx: FloatArray
-    Fy: FloatArray
-    Mz: FloatArray
-    block: IntArray
-    speed: FloatArray = field(default_factory=lambda: _UNKNOWN)
-    temperature: FloatArray = field(default_factory=lambda: _UNKNOWN)
-    time: FloatArray = field(default_factory=lambda: _UNKNOWN)
+    slip_ratio: FloatArray = field(default_factory=_absent)
+    camber: FloatArray = field(default_factory=_absent)
+    omega: FloatArray = field(default_factory=_absent)
+    Fx: FloatArray = field(default_factory=_absent)
+    Fy: FloatArray = field(default_factory=_absent)
+    Mz: FloatArray = field(default_factory=_absent)
+    block: IntArray = field(default_factory=_absent)
+    speed: FloatArray = field(default_factory=_absent)
+    temperature: FloatArray = field(default_factory=_absent)
+    time: FloatArray = field(default_factory=_absent)
 
     def __post_init__(self) -> None:
-        for name in ("speed", "temperature", "time"):
-            if getattr(self, name) is _UNKNOWN:
-                object.__setattr__(self, name, np.full(np.shape(self.load), np.nan))
+        for name in (f.name for f in fields(self) if getattr(self, f.name) is _ABSENT):
+            size = np.shape(self.load)
+            blank = np.full(size, 0.0 if name in ("slip_ratio", "camber") else np.nan)
+            object.__setattr__(self, name, np.arange(*size) if name == "block" else blank)
         shapes = {np.shape(getattr(self, f.name)) for f in fields(self)}
         if len(shapes) != 1 or len(shapes.pop()) != 1:
             raise ShapeError(
@@ -80,7 +88,7 @@ class ForceData:
         return ForceData(*(getattr(self, f.name)[index] for f in fields(self)))
 
 
-def force_data(campaign: Campaign, *, every: int = 1, travel_speed: bool = False) -> ForceData:
+def force_data(campaign: Campaign, *, travel_speed: bool = False) -> ForceData:
     """Read the forces of a campaign.
 
     Steady runs give one point each, the mean of their samples; a sweep gives its samples. Points
@@ -89,8 +97,6 @@ def force_data(campaign: Campaign, *, every: int = 1, travel_speed: bool = False
 
     Parameters
     ----------
-    every : int
-        Each `every`-th sample of a sweep is taken.
     travel_speed : bool
         True if the recorded slip ratio is by the speed of travel, v, and not by v cos(alpha): a
         freely rolling wheel then reads cos(alpha) - 1. Runs of freely rolling kinds read zero
@@ -101,12 +107,10 @@ def force_data(campaign: Campaign, *, every: int = 1, travel_speed: bool = False
     CalibrationError
         If there is no point at all.
     """
-    if every < 1:
-        raise ParameterError(f"force data: every = {every}; allowed is every >= 1")
     parts: list[ForceData] = []
     count = 0
     for run in campaign.runs():
-        part = _sweep(run, every) if run.plan.kind == "sweep" else _mean(run)
+        part = _read(run)
         if part is None:
             continue
         if run.plan.kind in FREE_ROLLING:
@@ -126,46 +130,35 @@ def force_data(campaign: Campaign, *, every: int = 1, travel_speed: bool = False
     )
 
 
-def _mean(run: Run) -> dict[str, FloatArray] | None:
-    """Return a steady run as one point, or None without load or slip angle."""
-    out = {}
-    for name in CONDITIONS + FORCES:
-        measured = run.mean(_MEASURED_AS.get(name, name))
-        out[name] = np.array([getattr(run.plan, name, np.nan) if measured is None else measured])
-    out |= {name: np.array([value.mean()]) for name, value in _further(run, 1).items()}
-    out["time"] = np.array([np.nan if run.plan.start is None else run.plan.start])
-    return _usable(out, np.zeros(1))
+def _read(run: Run) -> dict[str, FloatArray] | None:
+    """Return the means of a steady run or the samples of a sweep, None without load or slip angle.
 
-
-def _sweep(run: Run, every: int) -> dict[str, FloatArray] | None:
-    """Return the samples of a sweep, or None without load or slip angle."""
-    if run.rig_time is None or run.rig_time.size == 0:
+    What was not recorded is the set point.
+    """
+    swept = run.plan.kind == "sweep"
+    time = run.rig_time if swept else np.zeros(1)
+    if time is None or time.size == 0:
         return None
-    size = run.rig_time.size
-    out = {}
-    for name in CONDITIONS + FORCES:
-        samples = run.rig.get(_MEASURED_AS.get(name, name))
-        given = np.full(size, getattr(run.plan, name, np.nan)) if samples is None else samples
-        out[name] = given[::every]
-    out |= {name: value[::every] for name, value in _further(run, size).items()}
-    out["time"] = (run.plan.start or 0.0) + run.rig_time[::every] - run.rig_time[0]
-    return _usable(out, np.floor((run.rig_time[::every] - run.rig_time[0]) / BLOCK))
 
+    def told(channel: str, given: float) -> FloatArray:
+        samples = run.rig.get(channel)
+        if samples is None or samples.size == 0:
+            return np.full(time.size, given)
+        return samples if swept else np.array([samples.mean()])
 
-def _further(run: Run, size: int) -> dict[str, FloatArray]:
-    """Return speed and tread temperature, of the length `size` where they were not recorded."""
-    out = {"speed": run.rig.get("speed", np.full(size, run.plan.speed))}
-    known = [run.rig[name] for name in TEMPERATURES if name in run.rig]
-    out["temperature"] = known[0] if known else np.full(size, np.nan)
-    return {
-        name: np.full(size, np.nan) if value.size == 0 else value for name, value in out.items()
+    out = {
+        name: told(_MEASURED_AS.get(name, name), getattr(run.plan, name, np.nan))
+        for name in CONDITIONS + FORCES
     }
-
-
-def _usable(part: dict[str, FloatArray], block: FloatArray) -> dict[str, FloatArray] | None:
+    out["speed"] = told("speed", run.plan.speed)
+    known = [name for name in TEMPERATURES if name in run.rig]
+    out["temperature"] = told(next(iter(known), ""), np.nan)
+    start = run.plan.start
+    out["time"] = (start or 0.0) + time - time[0]
+    if not swept and start is None:
+        out["time"] = np.full(1, np.nan)
     for name in ("slip_ratio", "camber"):
-        part[name] = np.nan_to_num(part[name])
-    keep = np.isfinite(part["slip_angle"]) & np.isfinite(part["load"]) & (part["load"] > 0.0)
-    if not keep.any():
-        return None
-    return {name: values[keep] for name, values in {**part, "block": block}.items()}
+        out[name] = np.nan_to_num(out[name])
+    out["block"] = np.floor((time - time[0]) / BLOCK)
+    keep = np.isfinite(out["slip_angle"]) & np.isfinite(out["load"]) & (out["load"] > 0.0)
+    return {name: values[keep] for name, values in out.items()} if keep.any() else None

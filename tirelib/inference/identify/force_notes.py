@@ -1,8 +1,10 @@
 """What of a campaign's forces cannot be used, in words: nothing is left out silently."""
 
+from collections import defaultdict
+
 import numpy as np
 
-from tirelib.campaign import Campaign, Run
+from tirelib.campaign import Campaign
 from tirelib.core.quantities import QUANTITIES
 from tirelib.inference.identify.force_data import FORCES, FREE_ROLLING
 from tirelib.inference.identify.strain_notes import named
@@ -20,22 +22,24 @@ def force_notes(campaign: Campaign) -> tuple[str, ...]:
     and takes an unknown slip ratio or camber as zero.
     """
     samples = 0
-    lost: dict[str, list[int]] = {}
-    stood: dict[str, list[int]] = {}
+    lost, stood = defaultdict[str, list[int]](list), defaultdict[str, list[int]](list)
     for run in campaign.runs():
+        missing = [name for name in ("Fz", "slip_angle") if name not in run.rig]
         if not run.rig:
-            lost.setdefault("no rig quantity was recorded", []).append(run.plan.run)
+            lost["no rig quantity was recorded"].append(run.plan.run)
         elif run.plan.kind == "sweep":
-            samples += _bad_samples(run)
-            for reason in _missing(run):
-                lost.setdefault(reason, []).append(run.plan.run)
+            for name in missing:
+                lost[f"{name} is not recorded"].append(run.plan.run)
+            if not missing:
+                load, angle = run.rig["Fz"], run.rig["slip_angle"]
+                good = np.isfinite(load) & (load > 0.0) & np.isfinite(angle)
+                samples += int((~good).sum())
         else:
-            bad = [name for name in ("Fz", "slip_angle", *FORCES) if _holds_nan(run, name)]
-            for name in bad:
-                lost.setdefault(f"{name} holds samples that are no number", []).append(run.plan.run)
-            for name in ("Fz", "slip_angle"):
-                if name not in run.rig:
-                    stood.setdefault(name, []).append(run.plan.run)
+            for name in ("Fz", "slip_angle", *FORCES):
+                if not np.isfinite(run.rig.get(name, np.zeros(1))).all():
+                    lost[f"{name} holds samples that are no number"].append(run.plan.run)
+            for name in missing:
+                stood[name].append(run.plan.run)
     out = [f"{named(runs)}: {reason}; left out of the brush" for reason, runs in lost.items()]
     if samples:
         out.append(
@@ -51,14 +55,14 @@ def force_notes(campaign: Campaign) -> tuple[str, ...]:
 
 def taken_as_zero(campaign: Campaign) -> tuple[str, ...]:
     """Return a sentence for each slip that is neither measured nor a set point."""
-    blank: dict[str, list[int]] = {}
+    blank = defaultdict[str, list[int]](list)
     for plan in campaign.plans:
         ratio = plan.kind in FREE_ROLLING or np.isfinite(plan.slip_ratio)
         wanted = {"slip_ratio": not ratio, "camber": not np.isfinite(plan.camber)}
         if any(wanted.values()):
             rig = campaign.load(plan).rig
             for name in (name for name, asked in wanted.items() if asked and name not in rig):
-                blank.setdefault(name.replace("_", " "), []).append(plan.run)
+                blank[name.replace("_", " ")].append(plan.run)
     return tuple(
         f"{named(runs)}: {name} is unknown and taken as zero" for name, runs in blank.items()
     )
@@ -80,22 +84,3 @@ def noise_note(name: str, noise: float, size: float) -> tuple[str, ...]:
         "differ in something that is not recorded or not mapped (camber, temperature, wear, "
         "another tire), so no effect can be named reliably",
     )
-
-
-def _missing(run: Run) -> list[str]:
-    """Return why a sweep as a whole says nothing."""
-    return [f"{name} is not recorded" for name in ("Fz", "slip_angle") if name not in run.rig]
-
-
-def _bad_samples(run: Run) -> int:
-    """Return how many samples of a sweep are left out."""
-    if _missing(run):
-        return 0
-    load, angle = run.rig["Fz"], run.rig["slip_angle"]
-    good = np.isfinite(load) & (load > 0.0) & np.isfinite(angle)
-    return int((~good).sum())
-
-
-def _holds_nan(run: Run, name: str) -> bool:
-    samples = run.rig.get(name)
-    return samples is not None and samples.size > 0 and not bool(np.isfinite(samples).all())

@@ -11,7 +11,7 @@ import numpy as np
 
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.effects.brush_state import BrushConditions
-from tirelib.inference.identify.error_bands import MOST_LEVELS
+from tirelib.inference.identify.error_bands import MOST_LEVELS, numbered
 from tirelib.inference.identify.force_data import ForceData
 
 CELL_ANGLE, CELL_RATIO = float(np.deg2rad(0.5)), 0.01
@@ -53,13 +53,8 @@ class ForcePoints:
 
     def take(self, chosen: IntArray | BoolArray) -> "ForcePoints":
         """Return some of the points."""
-        return ForcePoints(
-            self.data.take(chosen),
-            self.slip_rate[chosen],
-            self.samples[chosen],
-            self.cell[chosen],
-            self.sweep[chosen],
-        )
+        arrays = (getattr(self, f.name)[chosen] for f in fields(self)[1:])
+        return ForcePoints(self.data.take(chosen), *arrays)
 
     @property
     def conditions(self) -> BrushConditions:
@@ -136,8 +131,7 @@ def _cells(data: ForceData) -> IntArray:
     ]
     if np.isfinite(data.temperature).all():
         rows.append(np.round(data.temperature / CELL_TEMPERATURE))
-    _, number = np.unique(np.stack(rows), axis=1, return_inverse=True)
-    return np.asarray(number, dtype=np.int64).ravel()
+    return numbered(*rows)
 
 
 def set_points(values: FloatArray) -> IntArray:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from tirelib.campaign import Campaign
-from tirelib.core.arrays import IntArray
 from tirelib.core.errors import TirelibError
 from tirelib.core.forked import forked
 from tirelib.core.parameters import Number, Tire
@@ -20,23 +19,15 @@ from tirelib.inference.identify.brush_estimates import SlipStiffness, estimates_
 from tirelib.inference.identify.brush_fit import BrushFit, fit_brush
 from tirelib.inference.identify.brush_law import stored_number
 from tirelib.inference.identify.brush_study import study_of
-from tirelib.inference.identify.error_bands import cells_of_load
 from tirelib.inference.identify.estimate import Estimate
-from tirelib.inference.identify.force_checks import ANGLE_SPAN
 from tirelib.inference.identify.force_data import ForceData, force_data
 from tirelib.inference.identify.force_notes import force_notes
 from tirelib.inference.identify.lateral_force import PressureComparison, compare_pressures
 
 MOST_SAMPLES = 50000
 """A longer sweep is thinned evenly: its samples are closer than its errors are independent."""
-MOST_COMPARED = 300
-"""Points for the ring's pressure against the parabola; each has its own pressure profile."""
-LEAST_COMPARED = 4
-"""Points of one load and pressure from which its stiffness can be fitted and points left out."""
 SMALL_ANGLE = 0.05
 """Slip angle up to which the lateral force acts behind the middle of the contact, [rad]."""
-_STILL = 0.01
-"""Slip ratio up to which a point rolls freely."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +87,7 @@ def identify_forces(
     tell("fitting the brush")
     fit = _fit(data, ring, campaign.header.axes, notes)
     tell("intervals of the brush")
-    study = study_of(fit, data)
+    study = study_of(fit)
     estimates = estimates_of(study, free_radius=campaign.header.tire.free_radius)
     if any("not_identifiable" in each.flags for each in estimates):
         helps = advice(study)
@@ -109,7 +100,12 @@ def identify_forces(
     comparison = None
     if ring is not None:
         tell("ring pressure against the parabola")
-        comparison = _compared(data, ring, notes)
+        try:
+            comparison = compare_pressures(data, ring)
+            said = comparison.notes
+        except TirelibError as error:
+            said = (str(error),)
+        notes += [f"ring pressure against parabola: {each}" for each in said]
     return ForceIdentification(
         fit,
         estimates,
@@ -182,45 +178,6 @@ def _remarks(fit: BrushFit, estimates: tuple[Estimate, ...], data: ForceData) ->
     if not np.isfinite(data.pressure).any():
         out.append("the inflation pressure is unknown: the brush holds at the pressure of the test")
     return out
-
-
-def _compared(data: ForceData, ring: Tire, notes: list[str]) -> PressureComparison | None:
-    usable = np.isfinite(data.Fy) & (np.abs(data.slip_ratio) <= _STILL)
-    chosen = np.flatnonzero(usable)
-    if not chosen.size or np.ptp(data.slip_angle[chosen]) < ANGLE_SPAN:
-        notes.append(
-            "ring pressure against parabola: no freely rolling runs over slip angle with Fy"
-        )
-        return None
-    chosen = _told(data, chosen, notes)
-    if not chosen.size:
-        return None
-    if chosen.size > MOST_COMPARED:
-        chosen = chosen[:: -(-chosen.size // MOST_COMPARED)]
-    try:
-        return compare_pressures(data.take(chosen), ring)
-    except TirelibError as error:
-        notes.append(f"ring pressure against parabola: {error}")
-        return None
-
-
-def _told(data: ForceData, chosen: IntArray, notes: list[str]) -> IntArray:
-    """Return the points whose load and pressure hold enough slip angles for a stiffness."""
-    cell = cells_of_load(data.take(chosen))
-    enough = np.array(
-        [
-            np.count_nonzero(cell == k) >= LEAST_COMPARED
-            and np.ptp(data.slip_angle[chosen[cell == k]]) >= ANGLE_SPAN
-            for k in range(int(cell.max()) + 1)
-        ]
-    )[cell]
-    if not enough.all():
-        notes.append(
-            f"ring pressure against parabola: {int((~enough).sum())} of {enough.size} points are "
-            f"left out, their load and pressure hold fewer than {LEAST_COMPARED} points or less "
-            f"than {np.rad2deg(ANGLE_SPAN):.0f} deg of slip angle"
-        )
-    return np.asarray(chosen[enough])
 
 
 def _numbers(

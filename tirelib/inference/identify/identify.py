@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from math import nan
 from typing import Any
 
@@ -22,7 +21,7 @@ from tirelib.inference.identify.literature import OF_PLAIN, literature
 from tirelib.inference.identify.next_run import NextRun, next_run
 from tirelib.inference.identify.strain_notes import gage_notes, run_notes
 from tirelib.inference.identify.structure import STRUCTURE_STD, WITHOUT_SHEAR
-from tirelib.inference.identify.waveform_fit import WaveformFit, fit_waveforms
+from tirelib.inference.identify.waveform_fit import WaveformFit, fit_waveforms, ridges
 from tirelib.measured.waveforms import measure_waveforms
 from tirelib.model.base import Coordinate, coordinates, values_of
 
@@ -94,20 +93,38 @@ def identify(
     """
     waves = measure_waveforms(campaign, progress=progress)
     runs = straight_runs(waves)
-
-    def tell(start: TireFile, values: Mapping[str, float | FloatArray]) -> None:
-        if found is not None:
-            found(_without_intervals(start, values, campaign, runs))
-
+    source = f"strain waveforms of {campaign.header.name}, {len(runs.waves)} straight runs"
     try:
-        start, fit, estimates = estimated(runs, tire, base=base, progress=progress, found=tell)
+        start, fit = fitted(runs, tire, base=base, progress=progress)
+        if found is not None:
+            bare = {
+                c.name: Number(float(fit.values[c.name]), nan, "fitted", source) for c in fit.free
+            }
+            found(TireFile(start.name, {**start.numbers, **bare}, dict(WITHOUT_EFFECTS)))
+        estimates = estimates_of(start, fit)
     except TirelibError as error:
         error.args = (_with_run(error, runs),)
         raise
     deviation = np.sqrt(np.diag(fit.covariance))
     correlation = fit.covariance / np.outer(deviation, deviation)
+    extra = {
+        "provenance": {
+            "method": "whole waveforms, Gauss-Newton with structural misfit",
+            "tirelib": __version__,
+            "campaign": campaign.header.name,
+            "data_sha256": campaign.content_hash(),
+            "runs": [int(run) for run in runs.waves.run],
+            "rms_microstrain": 1e6 * fit.rms,
+        },
+        "identified_correlation": {
+            "names": [each.name for each in estimates],
+            "values": correlation.tolist(),
+        },
+        **WITHOUT_EFFECTS,
+    }
+    told = {e.name: Number(e.value, e.std, "fitted", source, e.notes) for e in estimates}
     return Identification(
-        _fitted_file(start, estimates, correlation, campaign, runs, fit),
+        TireFile(start.name, {**start.numbers, **told}, extra),
         estimates,
         correlation,
         fit,
@@ -146,39 +163,14 @@ def _with_run(error: TirelibError, runs: StraightRuns) -> str:
     return f"{runs.waves.header.name}: {said}"
 
 
-def estimated(
-    runs: StraightRuns,
-    tire: TireFile | None = None,
-    *,
-    base: str = "plain",
-    progress: Callable[[str], None] | None = None,
-    found: Callable[[TireFile, Mapping[str, float | FloatArray]], None] | None = None,
-) -> tuple[TireFile, WaveformFit, tuple[Estimate, ...]]:
-    """Return start and priors, the fit, and what it tells of every number.
-
-    Parameters and errors as in `identify`, for runs that have been read already; `found` is called
-    with the start and the fitted values.
-    """
-    start, fit = fitted(runs, tire, base=base, progress=progress, found=found)
-    estimates = [estimate(fit, k, start) for k in range(len(fit.free))]
-    if any("not_identifiable" in e.flags for e in estimates):
-        ways = next_run(fit, structure_std(start, fit.free))
-        estimates = [
-            replace(e, helps=_help(e, fit, k, ways)) if "not_identifiable" in e.flags else e
-            for k, e in enumerate(estimates)
-        ]
-    return start, fit, tuple(estimates)
-
-
 def fitted(
     runs: StraightRuns,
     tire: TireFile | None = None,
     *,
     base: str = "plain",
     progress: Callable[[str], None] | None = None,
-    found: Callable[[TireFile, Mapping[str, float | FloatArray]], None] | None = None,
 ) -> tuple[TireFile, WaveformFit]:
-    """Return start and priors, and the fit: `estimated` without what the fit tells of a number."""
+    """Return start and priors, and the fit to runs; parameters and errors as of `identify`."""
     start = start_file(runs.waves.header, runs, tire, base)
     values = values_of(start.tire)
     free = coordinates(values)
@@ -189,7 +181,18 @@ def fitted(
         free=free,
         discrepancy=Discrepancy() if base == "plain" else COARSE,
         progress=progress,
-        found=None if found is None else partial(found, start),
+    )
+
+
+def estimates_of(start: TireFile, fit: WaveformFit) -> tuple[Estimate, ...]:
+    """Return what a fit tells of every number, and what would tell those that it does not."""
+    found = intervals_of(start, fit)
+    if not any("not_identifiable" in each.flags for each in found):
+        return found
+    ways = next_run(fit, structure_std(start, fit.free))
+    return tuple(
+        replace(e, helps=_help(e, fit, k, ways)) if "not_identifiable" in e.flags else e
+        for k, e in enumerate(found)
     )
 
 
@@ -274,27 +277,31 @@ def structure_std(start: TireFile, free: tuple[Coordinate, ...]) -> FloatArray:
     )
 
 
-def estimate(fit: WaveformFit, k: int, start: TireFile) -> Estimate:
-    """Return what a fit tells of its k-th coordinate, with the structural part and flags."""
-    coordinate = fit.free[k]
-    name = coordinate.name
-    value = float(fit.values[name])
-    fit_std = coordinate.spread(value, float(np.sqrt(fit.covariance[k, k])))
-    apart = float(structure_std(start, fit.free)[k])
-    structure = coordinate.spread(value, apart)
-    # both parts are normal in the coordinate: a number that moves by a factor is off by one
-    steps = np.array([-1.0, 1.0]) * np.hypot(fit.interval[k], 1.96 * apart)
-    low, high = sorted(float(coordinate.moved(value, step)) for step in steps)
-    prior = coordinate.spread(start.numbers[name].value, float(fit.prior_std[k]))
-    untold, wide = fit_std > TOLD * prior, 0.5 * (high - low) > WIDEST * abs(value)
-    far = abs(value - start.numbers[name].value) > 2.5 * prior
-    flags = {
-        "not_identifiable": untold or wide,
-        "at_boundary": far or _near_limit(name, value),
-        "not_quadratic": not fit.quadratic[k],
-    }
-    std = float(np.hypot(fit_std, structure))
-    return Estimate(name, value, std, low, high, fit_std, tuple(f for f, on in flags.items() if on))
+def intervals_of(start: TireFile, fit: WaveformFit) -> tuple[Estimate, ...]:
+    """Return what a fit tells of its coordinates, with the structural part and flags."""
+    ends, quadratic = ridges(fit)
+    fit_stds = np.sqrt(np.diag(fit.covariance))
+    out = []
+    for k, (coordinate, apart) in enumerate(
+        zip(fit.free, structure_std(start, fit.free).tolist(), strict=True)
+    ):
+        name = coordinate.name
+        value, given = float(fit.values[name]), start.numbers[name].value
+        fit_std = coordinate.spread(value, float(fit_stds[k]))
+        # both parts are normal in the coordinate: a number that moves by a factor is off by one
+        steps = np.array([-1.0, 1.0]) * np.hypot(ends[k], 1.96 * apart)
+        low, high = sorted(float(coordinate.moved(value, step)) for step in steps)
+        prior = coordinate.spread(given, float(fit.prior_std[k]))
+        untold, wide = fit_std > TOLD * prior, 0.5 * (high - low) > WIDEST * abs(value)
+        flags = {
+            "not_identifiable": untold or wide,
+            "at_boundary": abs(value - given) > 2.5 * prior or _near_limit(name, value),
+            "not_quadratic": not quadratic[k],
+        }
+        std = float(np.hypot(fit_std, coordinate.spread(value, apart)))
+        told = tuple(flag for flag, on in flags.items() if on)
+        out.append(Estimate(name, value, std, low, high, fit_std, told))
+    return tuple(out)
 
 
 def _help(estimate: Estimate, fit: WaveformFit, k: int, ways: NextRun) -> str:
@@ -308,65 +315,20 @@ def _help(estimate: Estimate, fit: WaveformFit, k: int, ways: NextRun) -> str:
         return 50.0 * abs(high - low) / size
 
     now = percent(float(ways.half_width[k]))
-    best = ways.best(k)
+    best, run = ways.best(k), ways.best_run(k)
     if best is None:
         return f"nothing that was weighed: half of the 95 % interval stays at {now:.0f} %"
-    then = percent(best.half_width)
+    then = percent(float(best.half_width[k]))
     said = f"{best.words}: half of the 95 % interval from {now:.0f} to {then:.0f} %"
     if then > 100.0 * WIDEST:
         said += ", still too wide"
-    run = ways.best_run(k)
     if run is None:
         return f"{said}; no runs within 20 % of the campaign's range help"
-    return said if run == best else f"{said}; {run.words}: {percent(run.half_width):.0f} %"
+    return (
+        said if run is best else f"{said}; {run.words}: {percent(float(run.half_width[k])):.0f} %"
+    )
 
 
 def _near_limit(name: str, value: float) -> bool:
     field = FIELDS[name]
     return value <= field.lowest * 1.001 if field.lowest > 0 else value >= field.highest * 0.999
-
-
-def _fitted_file(
-    start: TireFile,
-    estimates: tuple[Estimate, ...],
-    correlation: FloatArray,
-    campaign: Campaign,
-    runs: StraightRuns,
-    fit: WaveformFit,
-) -> TireFile:
-    """Return the identified tire as a model without effects; it holds its numbers' correlation."""
-    source = _source(campaign, runs)
-    fitted = {e.name: Number(e.value, e.std, "fitted", source, e.notes) for e in estimates}
-    provenance = {
-        "method": "whole waveforms, Gauss-Newton with structural misfit",
-        "tirelib": __version__,
-        "campaign": campaign.header.name,
-        "data_sha256": campaign.content_hash(),
-        "runs": [int(run) for run in runs.waves.run],
-        "rms_microstrain": 1e6 * fit.rms,
-    }
-    names = [each.name for each in estimates]
-    extra = {
-        "provenance": provenance,
-        "identified_correlation": {"names": names, "values": correlation.tolist()},
-        **WITHOUT_EFFECTS,
-    }
-    return TireFile(start.name, {**start.numbers, **fitted}, extra)
-
-
-def _without_intervals(
-    start: TireFile,
-    values: Mapping[str, float | FloatArray],
-    campaign: Campaign,
-    runs: StraightRuns,
-) -> TireFile:
-    """Return the fitted tire while nothing more is known of it than its values."""
-    fitted = {
-        c.name: Number(float(values[c.name]), nan, "fitted", _source(campaign, runs))
-        for c in coordinates(values_of(start.tire))
-    }
-    return TireFile(start.name, {**start.numbers, **fitted}, dict(WITHOUT_EFFECTS))
-
-
-def _source(campaign: Campaign, runs: StraightRuns) -> str:
-    return f"strain waveforms of {campaign.header.name}, {len(runs.waves)} straight runs"

@@ -14,7 +14,6 @@ no bristle has, a carcass that yields, decides the errors.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -24,28 +23,26 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import Tire
 from tirelib.inference.identify.brush_fit import fit_brush
+from tirelib.inference.identify.brush_law import SPECS
 from tirelib.inference.identify.error_bands import bands, cells_of_load
+from tirelib.inference.identify.force_checks import ANGLE_SPAN
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.identify.ring_patch import profiles
 from tirelib.physics.brush.forces import brush_forces
 from tirelib.physics.brush.parameters import BrushParameters
 from tirelib.physics.contact.profiles import PressureProfile
 
-MOST_POINTS = 2000
-"""Profiles are solved and integrated point by point: take run means, or thin a sweep."""
+MOST_POINTS = 300
+"""Points that are compared; each has its own pressure profile."""
+LEAST_POINTS = 4
+"""Points of one load and pressure from which its stiffness can be fitted and points left out."""
+STILL = 0.01
+"""Slip ratio up to which a point rolls freely."""
 SIGNIFICANT = 2.0
 """Standard errors of the mean difference from which one pressure counts as better."""
 KINDS = ("ring", "parabola")
-FITTED = (
-    "lateral_stiffness",
-    "friction",
-    "slip_angle_offset",
-    "Fy_offset",
-    "camber_thrust",
-)
-"""Constants of the brush; the camber thrust only where camber varies."""
 _FOLDS = 5
-_SIZE = MappingProxyType({"slip_angle_offset": 0.01, "Fy_offset": 200.0, "camber_thrust": 0.5})
+_STEP = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,142 +81,138 @@ class PressureBand:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PressureComparison:
-    """Lateral force by the ring's pressure and by the parabola.
+class PressureFit:
+    """The brush with one pressure; arrays of shape (n,).
 
     Attributes
     ----------
-    values : mapping of kind to mapping of name to float
-        Constants for "ring" and "parabola", SI, without the bristle stiffness.
-    stiffness : mapping of kind to array, shape (n_conditions,), [N/m^2]
-        c_py, one for each load and pressure or one for all.
-    condition : array of int, shape (n,)
-        Which of them each point has.
-    predicted, unseen : mapping of kind to array, shape (n,), [N]
+    values : mapping of name to float
+        Constants, SI, without the bristle stiffness.
+    stiffness : [N/m^2]
+        c_py at each point.
+    predicted, unseen : [N]
         Fy by the fit to all points, and by fits without the point.
-    half_length : array, shape (n,), [m]
-    table : tuple of PressureBand
-        All points first.
     """
 
-    values: Mapping[str, Mapping[str, float]]
-    stiffness: Mapping[str, FloatArray]
-    condition: IntArray
-    predicted: Mapping[str, FloatArray]
-    unseen: Mapping[str, FloatArray]
-    half_length: FloatArray
+    values: Mapping[str, float]
+    stiffness: FloatArray
+    predicted: FloatArray
+    unseen: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PressureComparison:
+    """Lateral force by the ring's pressure and by the parabola (`KINDS`).
+
+    Attributes
+    ----------
+    table : tuple of PressureBand
+        All points first.
+    notes : tuple of str
+        Which points were left out, and why.
+    """
+
+    fits: Mapping[str, PressureFit]
     table: tuple[PressureBand, ...]
+    notes: tuple[str, ...]
 
 
 def compare_pressures(
-    data: ForceData,
-    tire: Tire,
-    *,
-    stiffness: Literal["each", "one"] = "each",
-    held: Mapping[str, float] | None = None,
+    data: ForceData, tire: Tire, *, stiffness: Literal["each", "one"] = "each"
 ) -> PressureComparison:
     """Fit the brush with both pressures and compare their lateral forces.
 
     Parameters
     ----------
     data : ForceData
-        Run means, freely rolling, at least two slip angles; at most 2000 points.
+        Those are compared that roll freely and have Fy, at loads and pressures with enough slip
+        angles for a stiffness; of more than 300 some are left out evenly.
     tire : Tire
         Its ring gives pressure and contact length.
     stiffness : {"each", "one"}
         c_py for each load and pressure, or one for all. Points are predicted unseen by leaving out
         every fifth slip angle in turn ("each"), or the point's load and pressure altogether ("one",
         with several of them).
-    held : mapping of name to value, optional
-        Any of lateral_stiffness, friction, slip_angle_offset, Fy_offset, camber_thrust; not fitted.
 
     Raises
     ------
     CalibrationError
-        If there are too many or too few points, or Fy or the slip angles do not suffice.
+        If no points or slip angles are left.
     ParameterError, ConvergenceError
         From fit, ring and contact.
     """
-    _check(data)
     if stiffness not in ("each", "one"):
         raise ParameterError(
             f"lateral force: stiffness = {stiffness!r}; allowed are 'each' and 'one'"
         )
-    ring, parabola = profiles(tire, data.load, data.pressure, data.omega)
-    camber = bool(np.ptp(data.camber) > np.deg2rad(0.5))
-    known = {**({} if camber else {"camber_thrust": 0.0}), **(held or {})}
-    half = 0.5 * ring.length
-    start = _start(data, half, known)
-    free = tuple(name for name in start if name not in known)
+    chosen, notes = _chosen(data)
+    data = data.take(chosen)
+    pair = profiles(tire, data.load, data.pressure, data.omega)
     conditions = cells_of_load(data)
     group = conditions if stiffness == "each" else np.zeros_like(conditions)
     folds = _parts(data, group) if group.max() == conditions.max() else conditions
-    values, constants, predicted, unseen = {}, {}, {}, {}
-    for kind, profile in zip(KINDS, (ring, parabola), strict=True):
-        model = _Model(data, profile, group, free, start)
-        z = model.solve(model.start(), np.ones(len(data), dtype=np.bool_))
-        values[kind], constants[kind] = model.values(z)
-        predicted[kind] = model.force(z[None])[0]
-        out = np.empty(len(data))
-        for fold in np.unique(folds):
-            here = folds == fold
-            out[here] = model.force(model.solve(z, ~here)[None])[0, here]
-        unseen[kind] = out
-    table = _table(data, predicted, unseen)
-    return PressureComparison(values, constants, group, predicted, unseen, half, table)
+    start = _start(data, float(np.median(0.5 * pair[0].length)))
+    fits = {
+        kind: _Brush(data, profile, group, tuple(start)[1:]).fit(start, folds)
+        for kind, profile in zip(KINDS, pair, strict=True)
+    }
+    return PressureComparison(fits, _table(data, fits), notes)
+
+
+def _start(data: ForceData, half: float) -> dict[str, float]:
+    """Return the constants of the parabola's closed form: the start for both pressures."""
+    camber = ("camber_thrust",) if np.ptp(data.camber) > np.deg2rad(0.5) else ()
+    size = {"half_length": half, "load_power": 0.5}
+    found = fit_brush(data, forces=("Fy",), free=camber, held=size, robust=None).values
+    names = ("lateral_stiffness", "friction", "slip_angle_offset", "Fy_offset", *camber)
+    return {name: found[name] for name in names}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Model:
+class _Brush:
     """The brush at all points as a function of z: logarithms, or numbers over their size.
 
-    The logarithms of c_py, one per group, come first if it is free.
+    The logarithms of c_py come first, one per group, and then the constants with `names`.
     """
 
     data: ForceData
     profile: PressureProfile
     group: IntArray
-    free: tuple[str, ...]
-    base: Mapping[str, float]
+    names: tuple[str, ...]
 
     @property
-    def n_stiff(self) -> int:
-        """Number of bristle stiffnesses in z."""
-        return int(self.group.max()) + 1 if "lateral_stiffness" in self.free else 0
+    def groups(self) -> int:
+        return int(self.group.max()) + 1
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the rest of z."""
-        return tuple(name for name in self.free if name != "lateral_stiffness")
-
-    def start(self) -> FloatArray:
-        """Return z of the base."""
-        rest = [self.base[n] / _SIZE[n] if n in _SIZE else np.log(self.base[n]) for n in self.names]
-        first = np.log(self.base["lateral_stiffness"])
-        return np.concatenate([np.full(self.n_stiff, first), rest])
-
-    def values(self, z: FloatArray) -> tuple[dict[str, float], FloatArray]:
-        """Return the constants, and the stiffness of each group."""
-        count = int(self.group.max()) + 1
-        stiff = np.exp(z[: self.n_stiff])
-        if not self.n_stiff:
-            stiff = np.full(count, self.base["lateral_stiffness"])
-        return {name: float(value[0, 0]) for name, value in self._rest(z[None]).items()}, stiff
+    def fit(self, start: Mapping[str, float], folds: IntArray) -> PressureFit:
+        """Return the fit to all points, with each fold predicted by the others."""
+        first, *rest = (SPECS[name].z(value) for name, value in start.items())
+        begin = np.array([first] * self.groups + rest)
+        z = self.solve(begin, np.ones(len(self.data), dtype=np.bool_))
+        unseen = np.empty(len(self.data))
+        for fold in np.unique(folds):
+            out = folds == fold
+            unseen[out] = self.force(self.solve(z, ~out)[None])[0, out]
+        values = {name: float(value[0, 0]) for name, value in self._constants(z[None]).items()}
+        stiffness = np.exp(z[: self.groups])[self.group]
+        return PressureFit(values, stiffness, self.force(z[None])[0], unseen)
 
     def force(self, z: FloatArray) -> FloatArray:
         """Return Fy for several z, shape (m, p), at all points, shape (m, n)."""
-        at = self._rest(z)
-        stiff = np.exp(z[:, self.group]) if self.n_stiff else self.base["lateral_stiffness"]
+        at = self._constants(z)
         angle = self.data.slip_angle + at["slip_angle_offset"]
-        angle = angle + at["camber_thrust"] * self.data.camber
-        brush = BrushParameters(stiff, at["friction"])
+        angle = angle + at.get("camber_thrust", 0.0) * self.data.camber
+        brush = BrushParameters(np.exp(z[:, self.group]), at["friction"])
         return brush_forces(self.profile, brush, angle).Fy + at["Fy_offset"]
+
+    def _constants(self, z: FloatArray) -> dict[str, FloatArray]:
+        """Return the constants without stiffness, each shape (m, 1)."""
+        columns = zip(self.names, z[:, self.groups :].T, strict=True)
+        return {name: SPECS[name].value(column)[:, None] for name, column in columns}
 
     def solve(self, z: FloatArray, used: BoolArray) -> FloatArray:
         """Fit the points in use."""
-        if not z.size:
-            return z
-        scale = 0.05 * float(np.sqrt(np.mean(self.data.Fy**2)))
+        scale = 0.05 * _rms(self.data.Fy)
 
         def residual(x: FloatArray) -> FloatArray:
             rest = self.force(x[None])[0] - self.data.Fy
@@ -233,59 +226,38 @@ class _Model:
 
     def slopes(self, z: FloatArray) -> FloatArray:
         """Return dFy/dz, shape (n, p); all stiffnesses in one step, as each has its own points."""
-        step, first = 1e-5, self.n_stiff
-        moves = np.zeros((bool(first) + z.size - first, z.size))
-        moves[:1, :first] = step
-        moves[bool(first) :, first:] = step * np.eye(z.size - first)
-        force = self.force(z + np.vstack([np.zeros(z.size), moves]))
-        slope = (force[1:] - force[0]).T / step
-        if not first:
-            return np.asarray(slope)
+        first = self.groups
+        moves = np.zeros((2 + len(self.names), z.size))  # the first one stays
+        moves[1, :first] = _STEP
+        moves[2:, first:] = _STEP * np.eye(len(self.names))
+        force = self.force(z + moves)
+        slope = (force[1:] - force[0]).T / _STEP
         own = slope[:, :1] * (self.group[:, None] == np.arange(first))
         return np.concatenate([own, slope[:, 1:]], axis=1)
 
-    def _rest(self, z: FloatArray) -> dict[str, FloatArray]:
-        """Return the constants without stiffness, each shape (m, 1)."""
-        columns = dict(zip(self.names, z[:, self.n_stiff :].T, strict=True))
-        out = {}
-        for name, base in self.base.items():
-            if name == "lateral_stiffness":
-                continue
-            column = columns.get(name)
-            if column is None:
-                value = np.full(len(z), base)
-            else:
-                value = column * _SIZE[name] if name in _SIZE else np.exp(column)
-            out[name] = value[:, None]
-        return out
 
-
-def _start(data: ForceData, half: FloatArray, known: Mapping[str, float]) -> dict[str, float]:
-    """Return the constants of the parabola's closed form: the start for both pressures."""
-    if all(name in known for name in FITTED):
-        return {name: known[name] for name in FITTED}
-    size = {"half_length": float(np.median(half)), "load_power": 0.5}
-    free = () if "camber_thrust" in known else ("camber_thrust",)
-    found = fit_brush(data, forces=("Fy",), free=free, held={**size, **known}, robust=None).values
-    return {name: found[name] for name in FITTED}
-
-
-def _check(data: ForceData) -> None:
-    if len(data) > MOST_POINTS:
-        raise CalibrationError(
-            f"lateral force: {len(data)} points; allowed are {MOST_POINTS}: every point has its "
-            "own pressure; take run means, or thin the sweep (`every` of force_data)"
+def _chosen(data: ForceData) -> tuple[IntArray, tuple[str, ...]]:
+    """Return the points whose load and pressure hold enough slip angles for a stiffness."""
+    free = np.flatnonzero(np.isfinite(data.Fy) & (np.abs(data.slip_ratio) <= STILL))
+    angle = data.slip_angle[free]
+    if not free.size or np.ptp(angle) < ANGLE_SPAN:
+        raise CalibrationError("no freely rolling runs over slip angle with Fy")
+    cell = cells_of_load(data.take(free))
+    members = [angle[cell == k] for k in range(int(cell.max()) + 1)]
+    told = [each.size >= LEAST_POINTS and np.ptp(each) >= ANGLE_SPAN for each in members]
+    enough = np.array(told)[cell]
+    notes: tuple[str, ...] = ()
+    if not enough.all():
+        note = (
+            f"{int((~enough).sum())} of {enough.size} points are left out, their load and pressure "
+            f"hold fewer than {LEAST_POINTS} points or less than {np.rad2deg(ANGLE_SPAN):.0f} deg "
+            "of slip angle"
         )
-    missing = int((~np.isfinite(data.Fy)).sum())
-    if missing:
-        raise CalibrationError(
-            f"lateral force: Fy is not measured at {missing} of {len(data)} points; leave them out"
-        )
-    if np.abs(data.slip_ratio).max() > 0.01:
-        raise CalibrationError(
-            f"lateral force: a slip ratio of {float(np.abs(data.slip_ratio).max()):.3g}; freely "
-            "rolling points are needed, up to 0.01; leave drive and brake runs out"
-        )
+        if not enough.any():
+            raise CalibrationError(note)
+        notes = (note,)
+    chosen = free[enough]
+    return chosen[:: -(-chosen.size // MOST_POINTS)], notes
 
 
 def _parts(data: ForceData, group: IntArray) -> IntArray:
@@ -297,28 +269,27 @@ def _parts(data: ForceData, group: IntArray) -> IntArray:
     return part
 
 
-def _table(
-    data: ForceData, predicted: Mapping[str, FloatArray], unseen: Mapping[str, FloatArray]
-) -> tuple[PressureBand, ...]:
-    size = np.abs(data.Fy)
-    error = {kind: predicted[kind] - data.Fy for kind in KINDS}
-    blind = {kind: unseen[kind] - data.Fy for kind in KINDS}
-    over = {kind: np.abs(predicted[kind]) - size for kind in KINDS}
+def _table(data: ForceData, fits: Mapping[str, PressureFit]) -> tuple[PressureBand, ...]:
+    unseen = {kind: fit.unseen - data.Fy for kind, fit in fits.items()}
     out = []
     for band in bands(data):
         m = band.member
-        lead = blind["parabola"][m] ** 2 - blind["ring"][m] ** 2
+        lead = unseen["parabola"][m] ** 2 - unseen["ring"][m] ** 2
         spread = float(lead.std(ddof=1) / np.sqrt(lead.size)) if lead.size > 2 else np.inf
         gain = float(lead.mean()) / spread if spread > 0.0 else 0.0
         better = "no difference"
         if abs(gain) >= SIGNIFICANT:
             better = KINDS[0] if gain > 0.0 else KINDS[1]
-        sizes = {f"{kind}_rmse": _rms(error[kind][m]) for kind in KINDS}
-        sizes |= {f"{kind}_bias": float(over[kind][m].mean()) for kind in KINDS}
-        sizes |= {f"{kind}_rmse_unseen": _rms(blind[kind][m]) for kind in KINDS}
-        points = int(m.sum())
+        sizes = {}
+        for kind, fit in fits.items():
+            over = np.abs(fit.predicted) - np.abs(data.Fy)
+            sizes[f"{kind}_rmse"] = _rms((fit.predicted - data.Fy)[m])
+            sizes[f"{kind}_bias"] = float(over[m].mean())
+            sizes[f"{kind}_rmse_unseen"] = _rms(unseen[kind][m])
         out.append(
-            PressureBand(band.by, band.low, band.high, points, **sizes, gain=gain, better=better)
+            PressureBand(
+                band.by, band.low, band.high, int(m.sum()), **sizes, gain=gain, better=better
+            )
         )
     return tuple(out)
 

@@ -14,7 +14,6 @@ observation narrows.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Self
 
 import numpy as np
 
@@ -41,24 +40,29 @@ ABOUT_AS_MUCH = 1.6
 """Tests whose intervals differ by less than this factor are equal; the least effort is named."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Remedy:
-    """What would be measured, and how wide the interval of one number would then be.
+    """What would be measured, and how wide the intervals would then be.
 
     Attributes
     ----------
-    half_width : float
-        Half the 95 % interval, in the coordinate (relative to the value for one that is scaled).
+    half_width : shape (n_free,)
+        Half the 95 % intervals, in coordinates (relative to the value for one that is scaled).
     effort : int
         Runs, or quantities to be measured.
     """
 
     words: str
-    half_width: float
+    half_width: FloatArray
     effort: int
 
+    @classmethod
+    def of(cls, words: str, variance: FloatArray, effort: int) -> "Remedy":
+        """Return what leaves these variances of the coordinates."""
+        return cls(words, np.asarray(1.96 * np.sqrt(variance)), effort)
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, eq=False)
 class NextRun:
     """What every candidate would leave open.
 
@@ -66,67 +70,29 @@ class NextRun:
     ----------
     half_width : shape (n_free,)
         Half of each 95 % interval now, in coordinates.
-    runs, tests : tuple of tuple of Remedy
-        Per coordinate, the best first.
     """
 
     half_width: FloatArray
-    runs: tuple[tuple[Remedy, ...], ...]
-    tests: tuple[tuple[Remedy, ...], ...]
+    runs: tuple[Remedy, ...]
+    tests: tuple[Remedy, ...]
 
     def best(self, k: int) -> Remedy | None:
         """Return what narrows coordinate k most, for the least effort; None when nothing does."""
-        return _least_effort([*self.runs[k], *self.tests[k]], float(self.half_width[k]))
+        return self._least_effort((*self.runs, *self.tests), k)
 
     def best_run(self, k: int) -> Remedy | None:
         """Return the same of the runs alone."""
-        return _least_effort(self.runs[k], float(self.half_width[k]))
+        return self._least_effort(self.runs, k)
 
-
-def _least_effort(found: Sequence[Remedy], now: float) -> Remedy | None:
-    narrowest = min((remedy.half_width for remedy in found), default=np.inf)
-    if narrowest > LEAST_GAIN * now:
-        return None
-    good = [r for r in found if r.half_width <= min(ABOUT_AS_MUCH * narrowest, LEAST_GAIN * now)]
-    return min(good, key=lambda remedy: (remedy.effort, remedy.half_width))
-
-
-@dataclass(frozen=True, slots=True)
-class _State:
-    """Information of coordinates and misfit coefficients, and structural variances."""
-
-    information: FloatArray
-    structure: FloatArray
-
-    @classmethod
-    def of(cls, fit: WaveformFit, structure: FloatArray) -> Self:
-        problem, rows = fit.problem, fit.found.rows
-        every = fit.whiten(np.concatenate([rows[BASE], rows[MISFIT]]))
-        prior = np.concatenate([problem.widths**-2, np.ones(len(rows[MISFIT]))])
-        return cls(every @ every.T + np.diag(prior), structure**2)
-
-    def covariance(self, more: FloatArray | None = None) -> FloatArray:
-        """Return the covariance of the coordinates by the fit, after a run."""
-        k = self.structure.size
-        total = self.information if more is None else self.information + more
-        return np.asarray(np.linalg.inv(total)[:k, :k])
-
-    def after_run(self, words: str, effort: int, more: FloatArray) -> list[Remedy]:
-        """Return what every coordinate has left after runs with this information."""
-        total = np.diag(self.covariance(more)) + self.structure
-        return [Remedy(words, float(half), effort) for half in 1.96 * np.sqrt(total)]
-
-    def after_test(self, test: Test) -> list[Remedy]:
-        """Return the same after an observation of z, or of z + d for a test by definition."""
-        k = self.structure.size
-        fit = self.covariance()
-        whole = np.zeros((2 * k, 2 * k))
-        whole[:k, :k], whole[k:, k:] = fit, np.diag(self.structure)
-        seen = np.concatenate([test.rows, test.rows * test.by_definition], axis=1)
-        gain = whole @ seen.T @ np.linalg.inv(seen @ whole @ seen.T + test.covariance)
-        whole = whole - gain @ seen @ whole
-        total = np.diag(whole)[:k] + np.diag(whole)[k:] + 2.0 * np.diag(whole[:k, k:])
-        return [Remedy(test.words, float(h), len(test.rows)) for h in 1.96 * np.sqrt(total)]
+    def _least_effort(self, found: Sequence[Remedy], k: int) -> Remedy | None:
+        halves = [float(remedy.half_width[k]) for remedy in found]
+        narrowest, enough = min(halves, default=np.inf), LEAST_GAIN * float(self.half_width[k])
+        if narrowest > enough:
+            return None
+        good = [
+            i for i, half in enumerate(halves) if half <= min(ABOUT_AS_MUCH * narrowest, enough)
+        ]
+        return found[min(good, key=lambda i: (found[i].effort, halves[i]))]
 
 
 def next_run(fit: WaveformFit, structure: FloatArray) -> NextRun:
@@ -134,33 +100,46 @@ def next_run(fit: WaveformFit, structure: FloatArray) -> NextRun:
 
     `structure` (n_free,) is the structural standard deviation of each coordinate.
     """
-    state = _State.of(fit, structure)
-    points, series = _candidates(fit.problem.data.points)
+    problem, rows, apart = fit.problem, fit.found.rows, structure**2
+    every = fit.whiten(np.concatenate([rows[BASE], rows[MISFIT]]))
+    prior = np.concatenate([problem.widths**-2, np.ones(len(rows[MISFIT]))])
+    information = every @ every.T + np.diag(prior)
+
+    def covariance(more: FloatArray | float = 0.0) -> FloatArray:
+        """Return the covariance of the coordinates by the fit, after runs."""
+        return np.asarray(np.linalg.inv(information + more)[: apart.size, : apart.size])
+
+    points, series = _candidates(problem.data.points)
     each = [points.take([i]) for i in range(len(points))]
     added = forked([partial(_information, fit, point) for point in each])
     runs = []
     for words, which in series:
-        parts = [added[i] for i in which]
-        known = [part for part in parts if part is not None]
-        if len(known) == len(parts):
-            runs.append(state.after_run(words, len(parts), np.sum(known, axis=0)))
-    pressure = fit.problem.data.points.pressure
+        parts = [part for part in (added[i] for i in which) if part is not None]
+        if len(parts) == len(which):
+            left = np.diag(covariance(np.sum(parts, axis=0))) + apart
+            runs.append(Remedy.of(words, left, len(parts)))
+    pressure, now = problem.data.points.pressure, covariance()
     span = (BELOW * float(pressure.min()), ABOVE * float(pressure.max()))
-    tests = list(laboratory_tests(fit.values, fit.free, span))
-    press = _press_test(fit)
-    tests += [press] if press is not None else []
-    half = 1.96 * np.sqrt(np.diag(state.covariance()) + state.structure)
+    tests = [*laboratory_tests(fit.values, fit.free, span), *_press_test(fit)]
     return NextRun(
-        half,
-        _sorted(runs, len(fit.free)),
-        _sorted([state.after_test(test) for test in tests], len(fit.free)),
+        np.asarray(1.96 * np.sqrt(np.diag(now) + apart)),
+        tuple(runs),
+        tuple(Remedy.of(t.words, _after(t, now, apart), len(t.rows)) for t in tests),
     )
 
 
-def _sorted(found: Sequence[list[Remedy]], size: int) -> tuple[tuple[Remedy, ...], ...]:
-    return tuple(
-        tuple(sorted((row[k] for row in found), key=lambda r: r.half_width)) for k in range(size)
-    )
+def _after(test: Test, fit: FloatArray, structure: FloatArray) -> FloatArray:
+    """Return the variances after an observation of z, or of z + d for a test by definition.
+
+    The fit's covariance (n_free, n_free) is of z, the structural variances (n_free,) are of d.
+    """
+    k = structure.size
+    whole = np.zeros((2 * k, 2 * k))
+    whole[:k, :k], whole[k:, k:] = fit, np.diag(structure)
+    seen = np.concatenate([test.rows, test.rows * test.by_definition], axis=1)
+    gain = whole @ seen.T @ np.linalg.inv(seen @ whole @ seen.T + test.covariance)
+    whole = whole - gain @ seen @ whole
+    return np.asarray(np.diag(whole)[:k] + np.diag(whole)[k:] + 2.0 * np.diag(whole[:k, k:]))
 
 
 def _candidates(have: Operating) -> tuple[Operating, list[tuple[str, tuple[int, ...]]]]:
@@ -235,8 +214,8 @@ def _information(fit: WaveformFit, points: Operating) -> FloatArray | None:
     return np.asarray(each @ each.T)
 
 
-def _press_test(fit: WaveformFit) -> Test | None:
-    """Return the vertical stiffness in the middle of the campaign, from two loads."""
+def _press_test(fit: WaveformFit) -> list[Test]:
+    """Return the vertical stiffness in the middle of the campaign, from two loads, if there is."""
     have = fit.problem.data.points
     load, pressure = float(np.median(have.load)), float(np.median(have.pressure))
     points = replace(
@@ -246,8 +225,8 @@ def _press_test(fit: WaveformFit) -> Test | None:
     )
     at = _solved(fit, points)
     if at is None:
-        return None
+        return []
     model, slopes = at
     row = -np.diff(slopes.deflection[: len(fit.free)], axis=1).T / np.diff(model.deflection)
     words = f"a press test (vertical stiffness to {PRESS:.0%}) at {load:.0f} N"
-    return Test(words, row, PRESS**2 * np.eye(1), False)
+    return [Test(words, row, PRESS**2 * np.eye(1), False)]

@@ -1,5 +1,6 @@
 """What of a campaign's strain is not used, and why: no run and no gage is left out silently."""
 
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -63,10 +64,10 @@ def gage_notes(waves: Waveforms, used: tuple[int, ...]) -> tuple[str, ...]:
 
 def run_notes(waves: Waveforms, plans: Sequence[RunPlan]) -> tuple[str, ...]:
     """Return a sentence for each reason why straight runs with strain are not used."""
-    lost: dict[str, list[int]] = {}
+    lost = defaultdict[str, list[int]](list)
     for plan in plans:
         if is_straight(plan) and plan.run in waves.left_out:
-            lost.setdefault(waves.left_out[plan.run], []).append(plan.run)
+            lost[waves.left_out[plan.run]].append(plan.run)
     out = [f"{named(runs)}: {reason}; left out of the ring" for reason, runs in lost.items()]
     silent = waves.straight & ~some_gage_works(waves)
     if silent.any():
@@ -107,7 +108,7 @@ def broken_gages(campaign: Campaign) -> tuple[str, ...]:
     The gage nearest to the middle finds the contacts: without it no run has a waveform.
     """
     lateral = np.array(campaign.header.gage_lateral)
-    weak: dict[int, list[int]] = {}
+    weak = defaultdict[int, list[int]](list)
     flat: list[int] = []
     for plan in campaign.plans:
         run = campaign.load(plan) if is_straight(plan) else None
@@ -118,7 +119,7 @@ def broken_gages(campaign: Campaign) -> tuple[str, ...]:
             flat.append(plan.run)
             continue
         for gage in np.flatnonzero(size <= WEAK_GAGE * np.max(size)):
-            weak.setdefault(int(gage), []).append(plan.run)
+            weak[int(gage)].append(plan.run)
     middle = int(np.argmin(np.abs(lateral))) if lateral.size else -1
     few = f"below {1e6 * LEAST_STRAIN:.0f} microstrain, check their unit"
     said = (f"all gages of {named(flat)} range {few}",) if flat else ()

@@ -50,19 +50,12 @@ class WaveformFit:
         Every value of the tire, the free ones fitted.
     whiten : RunWhitening
         About the solution.
-    interval : shape (n_free, 2)
-        95 % interval of each coordinate, relative to the solution, along the ridge that the other
-        coordinates follow.
-    quadratic : shape (n_free,)
-        Whether the surface is a parabola there, so that the standard deviation tells all.
     """
 
     values: Mapping[str, float | FloatArray]
     found: Posterior
     problem: WaveformProblem
     whiten: RunWhitening
-    interval: FloatArray
-    quadratic: BoolArray
     steps: int
 
     @property
@@ -115,7 +108,6 @@ def fit_waveforms(
     free: tuple[Coordinate, ...] = FREE,
     discrepancy: Discrepancy | None = None,
     progress: Callable[[str], None] | None = None,
-    found: Callable[[Mapping[str, float | FloatArray]], None] | None = None,
 ) -> WaveformFit:
     """Fit the free coordinates.
 
@@ -127,8 +119,6 @@ def fit_waveforms(
         Standard deviations of the coordinates' priors, which are normal, about the start.
     discrepancy : Discrepancy or None
         None leaves the structural misfit out: smallest residual, intervals of noise alone.
-    found : callable, optional
-        Called with the fitted values before their intervals are computed.
 
     Raises
     ------
@@ -152,11 +142,7 @@ def fit_waveforms(
         begun = forked([partial(_valley, few, each) for each in few.starts])
         begin = min(begun, key=lambda each: each[0])[1]
     fit, whiten = _settled(problem, begin, SETTLED, step)
-    values = move(problem.values, fit.point.base[:-1], free)
-    if found is not None:
-        found(values)
-    interval, quadratic = _ridges(problem, fit, whiten)
-    return WaveformFit(values, fit, problem, whiten, interval, quadratic, steps)
+    return WaveformFit(move(problem.values, fit.point.base[:-1], free), fit, problem, whiten, steps)
 
 
 def _valley(few: WaveformProblem, start: Point) -> tuple[float, Point]:
@@ -196,10 +182,13 @@ def _settled(
     return fit, whiten
 
 
-def _ridges(
-    problem: WaveformProblem, found: Posterior, whiten: RunWhitening
-) -> tuple[FloatArray, BoolArray]:
-    """Return 95 % intervals along the ridges, and where the surface is quadratic."""
+def ridges(fit: WaveformFit) -> tuple[FloatArray, BoolArray]:
+    """Return intervals of the coordinates, and whether their standard deviations tell all.
+
+    The 95 % intervals (n_free, 2) are relative to the solution, along the ridge that the other
+    coordinates follow; the surface is a parabola there, or not (n_free,).
+    """
+    problem, found, whiten = fit.problem, fit.found, fit.whiten
     white = {name: whiten(found.rows[name]) for name in (BASE, MISFIT)}
     normal = Normal.of(white, whiten(found.solved.rest))
     metric, every = Weighed(normal, normal.spread(SPREAD)), np.concatenate(list(white.values()))

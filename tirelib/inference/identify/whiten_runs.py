@@ -26,83 +26,28 @@ GROWTH = 5e-4
 
 
 @dataclass(frozen=True, slots=True)
-class Depth:
-    """Whitens the deflections that were measured.
+class RunWhitening:
+    """Turns rows of all that is measured into rows of unit covariance.
 
-    Their errors: a random part, the load and the pressure that the run really had, a common zero,
-    a structural part in proportion to the deflection, and growth of the free radius with speed.
+    A row holds the strain of all runs, then the deflections that take part. Errors of these are a
+    random part, the load and the pressure that the run really had, a common zero, a structural
+    part in proportion to the deflection, and growth of the free radius with speed.
 
     Attributes
     ----------
+    strain : Whitening
     known : shape (n_runs,)
-        Where they were measured.
+        Of which runs the deflection takes part.
     gain : shape (n_runs, n_phi), [m]
         What a strain residual tells of the deflection's, through load and pressure.
     inverse : shape (n_known, n_known), [1/m]
         Inverse Cholesky factor of what is left.
     """
 
+    strain: Whitening
     known: BoolArray
     gain: FloatArray
     inverse: FloatArray
-
-    @classmethod
-    def about(
-        cls,
-        data: Data,
-        depth: FloatArray,
-        by_set_point: FloatArray,
-        whiten: Whitening,
-        tangent: FloatArray,
-        scale: FloatArray,
-    ) -> Self:
-        """Return the whitening about a solution with deflections `depth`, (n_runs,).
-
-        Parameters
-        ----------
-        by_set_point : shape (n_runs, 2), [m]
-            Slopes of the deflection by relative load and pressure.
-        whiten, tangent, scale
-            The whitening, tangents and standard deviations of the strain.
-        """
-        known = np.isfinite(data.deflection)
-        # b: load, pressure, gain, angle in units of their deviations; strain A b, deflection d b
-        moved = np.pad(by_set_point, ((0, 0), (0, 2))) * scale
-        inside = whiten.basis.swapaxes(1, 2) @ (tangent * scale[:, None, :])
-        half = whiten.inverse @ inside
-        gain = np.einsum(
-            "rni,rji,rjk,rk->rn", whiten.basis, whiten.inverse, half, moved, optimize=True
-        )
-        told = np.einsum("rjk,rk->rj", half, moved)
-        random = data.deflection_std**2 + np.sum(moved**2, axis=1) - np.sum(told**2, axis=1)
-        speed = np.nan_to_num(data.points.speed[known]) / 30.0
-        common = np.stack(
-            [np.full(speed.size, ZERO), DEPTH_SHARE * depth[known], GROWTH * speed**2]
-        )
-        lower = linalg.cholesky(np.diag(random[known]) + common.T @ common, lower=True)
-        inverse = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True)
-        return cls(known, gain, np.asarray(inverse))
-
-    def __call__(self, strain: FloatArray, deflection: FloatArray) -> FloatArray:
-        """Return whitened rows (n, n_known) of strain (n, n_runs, n_phi) and deflection."""
-        told = np.einsum("rn,krn->kr", self.gain[self.known], strain[:, self.known])
-        return np.asarray((deflection - told) @ self.inverse.T)
-
-
-@dataclass(frozen=True, slots=True)
-class RunWhitening:
-    """Turns rows of all that is measured into rows of unit covariance.
-
-    A row holds the strain of all runs, then the deflections that take part.
-
-    Attributes
-    ----------
-    depth : Depth or None
-        None where no deflection takes part.
-    """
-
-    strain: Whitening
-    depth: Depth | None
 
     @classmethod
     def about(
@@ -126,18 +71,32 @@ class RunWhitening:
         """
         scale = scales(data.tolerance, data.angle_std)
         tangent = tangents(waveform, *by_set_point)
-        strain = whitening_of(tangent, scale, data.noise)
-        if not data.with_deflection:
-            return cls(strain, None)
-        return cls(strain, Depth.about(data, depth, depth_by_set_point.T, strain, tangent, scale))
+        whiten = whitening_of(tangent, scale, data.noise)
+        known = np.isfinite(data.deflection) & data.with_deflection
+        # b: load, pressure, gain, angle in units of their deviations; strain A b, deflection d b
+        moved = np.pad(depth_by_set_point.T, ((0, 0), (0, 2))) * scale
+        inside = whiten.basis.swapaxes(1, 2) @ (tangent * scale[:, None, :])
+        half = whiten.inverse @ inside
+        gain = np.einsum(
+            "rni,rji,rjk,rk->rn", whiten.basis, whiten.inverse, half, moved, optimize=True
+        )
+        told = np.einsum("rjk,rk->rj", half, moved)
+        random = data.deflection_std**2 + np.sum(moved**2, axis=1) - np.sum(told**2, axis=1)
+        speed = np.nan_to_num(data.points.speed[known]) / 30.0
+        common = np.stack(
+            [np.full(speed.size, ZERO), DEPTH_SHARE * depth[known], GROWTH * speed**2]
+        )
+        covariance = np.diag(random[known]) + common.T @ common
+        lower = linalg.cholesky(covariance, lower=True)
+        inverse = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True)
+        return cls(whiten, known, gain, np.asarray(inverse))
 
     def __call__(self, rows: FloatArray) -> FloatArray:
         """Return whitened rows of rows (..., n_runs * n_phi + n_known)."""
         runs, angles = self.strain.basis.shape[:2]
         flat = rows.reshape(-1, rows.shape[-1])
         strain = flat[:, : runs * angles].reshape(len(flat), runs, angles)
+        told = np.einsum("rn,krn->kr", self.gain[self.known], strain[:, self.known])
+        deep = (flat[:, runs * angles :] - told) @ self.inverse.T
         white = self.strain(strain).reshape(len(flat), runs * angles)
-        if self.depth is not None:
-            deep = self.depth(strain, flat[:, runs * angles :])
-            white = np.concatenate([white, deep], axis=1)
-        return np.asarray(white.reshape(rows.shape))
+        return np.asarray(np.concatenate([white, deep], axis=1).reshape(rows.shape))

@@ -5,14 +5,14 @@ the value that changes nothing: other programs differ in what they take an absen
 units, axes ISO 8855 (TYDEX W); errors and range of the fit are comments.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from types import MappingProxyType
 
 import numpy as np
 
 from tirelib.core.errors import FormatError, ParameterError
 from tirelib.core.parameters.tir import TirEntry, TirFile, TirLine, TirSection
-from tirelib.core.units import from_si
+from tirelib.core.quantities import QUANTITIES
 from tirelib.core.version import __version__
 from tirelib.inference.magic.fit import MagicFit
 from tirelib.physics.brush.mf_tire import LIMITS, NAME, Coefficients, MagicTire, impossible
@@ -46,13 +46,6 @@ RANGES = {
     "camber": "INCLINATION_ANGLE_RANGE",
     "pressure": "INFLATION_PRESSURE_RANGE",
 }
-SHOWN = {
-    "load": ("load", "N", "force"),
-    "slip_ratio": ("slip ratio", "1", "ratio"),
-    "slip_angle": ("slip angle", "deg", "angle"),
-    "camber": ("camber", "deg", "angle"),
-    "pressure": ("pressure", "bar", "pressure"),
-}
 COEFFICIENTS = {
     "SCALING_COEFFICIENTS": "LFZO LCX LMUX LEX LKX LHX LVX LXAL LCY LMUY LEY LKY LKYC LHY LVY LYKA "
     "LVYKA LTR LRES LS LKZC",
@@ -79,7 +72,10 @@ def magic_tire(tire: TirFile) -> MagicTire:
     """
     problems: list[str] = []
     values = _coefficients(tire, problems)
-    _check_required(tire, values, problems)
+    for name in (name for name in REQUIRED if name not in values):
+        elsewhere = ", ".join(f"[{section}]" for section, _ in tire.places(name))
+        hint = f"; what {elsewhere} has is not read, [..._COEFFICIENTS] is" if elsewhere else ""
+        problems.append(f"{name} is missing; the Magic Formula needs it{hint}")
     problems += impossible(values)
 
     def number(key: str) -> float | None:
@@ -131,15 +127,6 @@ def _coefficients(tire: TirFile, problems: list[str]) -> dict[str, float]:
                     "value is needed; remove the other"
                 )
     return {key: value for key, (_, value) in found.items()}
-
-
-def _check_required(tire: TirFile, values: Mapping[str, float], problems: list[str]) -> None:
-    for name in REQUIRED:
-        if name in values:
-            continue
-        elsewhere = ", ".join(f"[{section}]" for section, _ in tire.places(name))
-        hint = f"; what {elsewhere} has is not read, [..._COEFFICIENTS] is" if elsewhere else ""
-        problems.append(f"{name} is missing; the Magic Formula needs it{hint}")
 
 
 def tir_of(fit: MagicFit, source: str) -> TirFile:
@@ -195,9 +182,9 @@ def words(fit: MagicFit, source: str) -> list[str]:
         )
     lines += ["", "Range of these points; outside of it the formula extrapolates:"]
     for name, ends in fit.tire.limits.items():
-        title, unit, kind = SHOWN[name]
-        low, high = (from_si(end, unit, kind) if kind != "ratio" else end for end in ends)
-        lines.append(f"  {title}: {low:.4g} .. {high:.4g}" + (f" {unit}" if unit != "1" else ""))
+        quantity = QUANTITIES[name]
+        low, high = map(quantity.told, ends)
+        lines.append(f"  {quantity.title}: {low:.4g} .. {high:.4g} {quantity.words}".rstrip())
     for name in ("Fx", "Mz"):
         if name not in fit.errors:
             lines.append(f"No point has {name}: the file does not describe it.")

@@ -7,7 +7,7 @@ What the data do not vary (load, camber, pressure) and forces that they lack are
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -15,6 +15,7 @@ from scipy.optimize import least_squares
 
 from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import CalibrationError
+from tirelib.inference.identify.force_data import ForceData
 from tirelib.physics.brush.mf import magic_forces
 from tirelib.physics.brush.mf_tire import Coefficients, MagicTire
 
@@ -30,34 +31,8 @@ VARIED = 1.05
 """Ratio of the highest to the lowest load or pressure from which its coefficients are fitted. With
 a noise of 1 % these lower the error of Fy from .98 to .72 % at a ratio of 1.1, and no longer at
 1.025 (.72 and .73 %; `build/export_constants.py`)."""
+FORCES = ("Fx", "Fy", "Mz")
 VARIED_CAMBER = float(np.deg2rad(0.5))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MagicPoints:
-    """Points of forces; arrays of shape (n,), SI, ISO 8855.
-
-    Attributes
-    ----------
-    load, slip_angle, slip_ratio, camber, pressure : [N], [rad], [-], [rad], [Pa]
-        Pressure is NaN where unknown; then no coefficient of pressure is fitted.
-    Fx, Fy, Mz : [N], [N], [N m]
-        NaN where not measured.
-    """
-
-    load: FloatArray
-    slip_angle: FloatArray
-    slip_ratio: FloatArray
-    camber: FloatArray
-    pressure: FloatArray
-    Fx: FloatArray
-    Fy: FloatArray
-    Mz: FloatArray
-
-    @property
-    def pressure_known(self) -> bool:
-        """Whether the pressure is known at every point."""
-        return bool(np.isfinite(self.pressure).all())
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,12 +170,13 @@ STAGES = (
 """In the order of the fit: what a stage finds, the later ones hold."""
 
 
-def fit_magic(points: MagicPoints, *, radius: float, nominal_load: float | None = None) -> MagicFit:
+def fit_magic(points: ForceData, *, radius: float, nominal_load: float | None = None) -> MagicFit:
     """Fit the Magic Formula 6.1.
 
     Parameters
     ----------
-    points : MagicPoints
+    points : ForceData
+        Where the pressure is not known at every point, no coefficient of it is fitted.
     radius : float, [m]
         Unloaded radius.
     nominal_load : float, [N], optional
@@ -213,8 +189,13 @@ def fit_magic(points: MagicPoints, *, radius: float, nominal_load: float | None 
     """
     load = points.load
     nominal = nominal_load or 0.5 * float(load.min() + load.max())
-    pressure = float(np.median(points.pressure)) if points.pressure_known else None
-    limits = {name: (float(x.min()), float(x.max())) for name, x in _conditions(points).items()}
+    known = bool(np.isfinite(points.pressure).all())
+    pressure = float(np.median(points.pressure)) if known else None
+    names = ("load", "slip_ratio", "slip_angle", "camber", *(("pressure",) if known else ()))
+    limits = {}
+    for name in names:
+        x = getattr(points, name)
+        limits[name] = float(x.min()), float(x.max())
     values: dict[str, float] = {"PKY2": 1.8, "PKY4": 2.0}
     fitted: list[str] = []
     at_limit: list[str] = []
@@ -231,12 +212,12 @@ def fit_magic(points: MagicPoints, *, radius: float, nominal_load: float | None 
         )
 
     for stage in STAGES:
-        rows = _rows(points, stage)
-        found = _Fit(points, stage, rows, (load.min() / nominal - 1, load.max() / nominal - 1))
-        if rows.sum() < POINTS_PER_COEFFICIENT * found.size:
+        taken = points.take(_rows(points, stage))
+        found = _Fit(taken, stage, (load.min() / nominal - 1, load.max() / nominal - 1))
+        if len(taken) < POINTS_PER_COEFFICIENT * found.size:
             if stage is STAGES[0]:
                 raise CalibrationError(
-                    f"Magic Formula: {int(rows.sum())} points with Fy and without longitudinal "
+                    f"Magic Formula: {len(taken)} points with Fy and without longitudinal "
                     f"slip; {POINTS_PER_COEFFICIENT * found.size} are needed for "
                     f"{found.size} coefficients; record more slip angles and loads"
                 )
@@ -254,13 +235,7 @@ def fit_magic(points: MagicPoints, *, radius: float, nominal_load: float | None 
     )
 
 
-def _conditions(points: MagicPoints) -> dict[str, FloatArray]:
-    names = ["load", "slip_ratio", "slip_angle", "camber"]
-    names += ["pressure"] if points.pressure_known else []
-    return {name: getattr(points, name) for name in names}
-
-
-def _rows(points: MagicPoints, stage: _Stage) -> BoolArray:
+def _rows(points: ForceData, stage: _Stage) -> BoolArray:
     """Return the points that a stage is fitted to."""
     along = np.abs(points.slip_ratio) > PURE_RATIO
     across = np.abs(points.slip_angle) > PURE_ANGLE
@@ -269,48 +244,43 @@ def _rows(points: MagicPoints, stage: _Stage) -> BoolArray:
     return np.asarray(chosen & np.isfinite(getattr(points, stage.force)))
 
 
-def _forces(points: MagicPoints, rows: BoolArray, tire: MagicTire, combined: bool) -> FloatArray:
+def _forces(points: ForceData, tire: MagicTire, combined: bool) -> FloatArray:
     """Return Fx, Fy, Mz of the formula, shape (3, n)."""
     at = magic_forces(
         tire,
-        points.load[rows],
-        points.slip_angle[rows],
-        points.slip_ratio[rows],
-        points.camber[rows],
-        points.pressure[rows] if points.pressure_known else None,
+        points.load,
+        points.slip_angle,
+        points.slip_ratio,
+        points.camber,
+        points.pressure if tire.nominal_pressure is not None else None,
         combined=combined,
     )
     return np.stack([at.Fx, at.Fy, at.Mz])
 
 
 class _Fit:
-    """The fit of one stage."""
+    """The fit of one stage, to points whose loads end at `ends` [dfz] over the whole campaign."""
 
-    def __init__(
-        self, points: MagicPoints, stage: _Stage, rows: BoolArray, ends: tuple[float, float]
-    ) -> None:
-        self.points, self.stage, self.rows, self.ends = points, stage, rows, ends
-        varied = _varied(points, rows)
-        self.by_load = "load" in varied
-        self.terms = [term for term in stage.terms if not term.needs or term.needs in varied]
-        self.size = sum(1 + self._sloped(term) for term in self.terms)
+    def __init__(self, points: ForceData, stage: _Stage, ends: tuple[float, float]) -> None:
+        self.points, self.stage, self.ends = points, stage, ends
+        varied = _varied(points)
+        terms = [term for term in stage.terms if not term.needs or term.needs in varied]
+        self.terms = [
+            term if "load" in varied else replace(term, slope="")  # a slope needs two loads
+            for term in terms
+        ]
+        self.size = sum(1 + bool(term.slope) for term in self.terms)
         self.at_limit: list[str] = []
-
-    def _sloped(self, term: _Term) -> bool:
-        return bool(term.slope) and self.by_load
 
     @property
     def names(self) -> list[str]:
         """Coefficients that are fitted."""
-        return [
-            name
-            for term in self.terms
-            for name in ((term.name, term.slope) if self._sloped(term) else (term.name,))
-        ]
+        return [name for term in self.terms for name in (term.name, term.slope) if name]
 
     def _column(self, what: str) -> FloatArray:
-        return np.array(
-            [getattr(term, what) for term in self.terms for _ in range(1 + self._sloped(term))]
+        return np.repeat(
+            [getattr(term, what) for term in self.terms],
+            [1 + bool(term.slope) for term in self.terms],
         )
 
     def _put(self, x: FloatArray, values: dict[str, float]) -> None:
@@ -319,20 +289,20 @@ class _Fit:
         rest = iter(x.tolist())
         for term in self.terms:
             first = next(rest)
-            if self._sloped(term):
+            if term.slope:
                 values[term.slope] = float((next(rest) - first) / (high - low))
                 first -= values[term.slope] * low
             values[term.name] = float(first)
 
     def run(self, tire: Callable[[], MagicTire], values: dict[str, float]) -> None:
         """Fit, and leave the coefficients in `values`."""
-        number = ("Fx", "Fy", "Mz").index(self.stage.force)
-        wanted = getattr(self.points, self.stage.force)[self.rows]
+        number = FORCES.index(self.stage.force)
+        wanted = getattr(self.points, self.stage.force)
         size = float(np.abs(wanted).max()) or 1.0
 
         def residuals(x: FloatArray) -> FloatArray:
             self._put(x, values)
-            found = _forces(self.points, self.rows, tire(), self.stage.combined)
+            found = _forces(self.points, tire(), self.stage.combined)
             return np.asarray((found[number] - wanted) / size)
 
         low, high = self._column("low"), self._column("high")
@@ -340,19 +310,16 @@ class _Fit:
             residuals, self._column("start"), bounds=(low, high), x_scale="jac", max_nfev=200
         )
         self._put(done.x, values)
-        stopped = np.flatnonzero(done.active_mask)
-        self.at_limit = [self.names[k] for k in stopped]
+        self.at_limit = [self.names[k] for k in np.flatnonzero(done.active_mask)]
 
 
-def _varied(points: MagicPoints, rows: BoolArray) -> set[str]:
+def _varied(points: ForceData) -> set[str]:
     """Return which conditions vary enough for coefficients of their own."""
-    if not rows.any():
+    if not len(points):
         return set()
-    found = set()
-    if np.ptp(points.camber[rows]) > VARIED_CAMBER:
-        found.add("camber")
+    found = {"camber"} if np.ptp(points.camber) > VARIED_CAMBER else set()
     for name in ("load", "pressure"):
-        x = getattr(points, name)[rows]
+        x = getattr(points, name)
         if np.isfinite(x).all() and x.max() > VARIED * x.min():
             found.add(name)
     return found
@@ -374,10 +341,9 @@ def _assume(
     }
 
 
-def _errors(points: MagicPoints, tire: MagicTire) -> dict[str, ForceError]:
-    every = np.ones(points.load.shape, dtype=np.bool_)
+def _errors(points: ForceData, tire: MagicTire) -> dict[str, ForceError]:
     found = {}
-    for name, force in zip(("Fx", "Fy", "Mz"), _forces(points, every, tire, True), strict=True):
+    for name, force in zip(FORCES, _forces(points, tire, True), strict=True):
         measured = getattr(points, name)
         known = np.isfinite(measured)
         if known.any():

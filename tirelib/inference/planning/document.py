@@ -8,6 +8,7 @@ import numpy as np
 
 from tirelib.core.quantities import QUANTITIES
 from tirelib.effects import CATALOGUE, Effect
+from tirelib.inference.compare.force_model import ForceModel
 from tirelib.inference.compare.forces import UNITS
 from tirelib.inference.diagnose.diagnose import FALSE_ALARM
 from tirelib.inference.diagnose.forces.case import ForceCase
@@ -63,26 +64,29 @@ class Plan:
 def plan_test(
     hypotheses: Hypotheses | None,
     suspects: Suspects,
-    envelope: Envelope,
+    envelope: Envelope | None,
     *,
     campaign: str = "",
+    quantity: str = "strain",
+    model: ForceModel | None = None,
     wanted: float = WANTED,
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
-    """Judge the runs of an envelope for suspects of strain.
+    """Judge the runs of an envelope for suspects.
 
-    Hypotheses are about the present runs, and needed if there are suspects. `wanted` is the
-    separation for which repeats are counted.
+    Hypotheses are about the present runs; they and the envelope are needed if there are suspects,
+    and for a force its model. `wanted` is the separation for which repeats are counted.
 
     Raises
     ------
     ParameterError
         If no run in the envelope has a solution.
     """
-    if not suspects.effects or hypotheses is None:
-        return Plan(suspects, None, {}, wanted, campaign)
-    test = next_test(hypotheses, suspects, envelope, progress=progress)
-    return Plan(suspects, test, gains(hypotheses, suspects, test), wanted, campaign)
+    if not suspects.names or hypotheses is None or envelope is None:
+        return Plan(suspects, None, {}, wanted, campaign, quantity)
+    test = next_test(hypotheses, suspects, envelope, model=model, progress=progress)
+    again = gains(hypotheses, suspects, test)
+    return Plan(suspects, test, again, wanted, campaign, quantity)
 
 
 def plan_force_test(
@@ -97,16 +101,23 @@ def plan_force_test(
 ) -> Plan:
     """Judge further runs of a force for suspects: points, or sweeps; errors as of `plan_test`.
 
-    The envelope is the one of `tirelib.inference.planning.force_runs.force_envelope`, and needed if
-    there are suspects, which are held against the catalogue.
+    The envelope is the one of `tirelib.inference.planning.force_runs.force_envelope`. Suspects are
+    held against the catalogue.
     """
-    if not suspects.effects or envelope is None:
-        return Plan(suspects, None, {}, wanted, case.name, case.quantity)
-    given = case.as_given(catalogue)
-    hypotheses = Hypotheses(given, plain_tires(case.quantity), false_alarm, progress)
-    test = next_test(hypotheses, suspects, envelope, model=case.model, progress=progress)
-    again = gains(hypotheses, suspects, test)
-    return Plan(suspects, test, again, wanted, case.name, case.quantity)
+    among = None
+    if suspects.names:
+        given = case.as_given(catalogue)
+        among = Hypotheses(given, plain_tires(case.quantity), false_alarm, progress)
+    return plan_test(
+        among,
+        suspects,
+        envelope,
+        campaign=case.name,
+        quantity=case.quantity,
+        model=case.model,
+        wanted=wanted,
+        progress=progress,
+    )
 
 
 def next_test_document(
@@ -131,9 +142,7 @@ def next_test_document(
         As `plan_test`; and if the campaign does not give its speed.
     """
     suspects, campaign = suspects_of(told, catalogue), str(told.get("campaign", ""))
-    if not suspects.effects:
-        return plan_document(Plan(suspects, None, {}, WANTED, campaign))
-    envelope = Envelope.of(problem_of(hypotheses).data.points)
+    envelope = Envelope.of(problem_of(hypotheses).data.points) if suspects.names else None
     plan = plan_test(hypotheses, suspects, envelope, campaign=campaign, progress=progress)
     return plan_document(plan)
 
@@ -157,10 +166,7 @@ def plan_document(plan: Plan) -> dict[str, Any]:
             "left_out": dict(test.left_out) if test else {},
             "present": [],
             "candidates": [],
-            "best": None,
-            "random_median": None,
-            "repeats": None,
-            "envelope": None,
+            **dict.fromkeys(("best", "random_median", "repeats", "envelope")),
             "dropped": 0,
         }
     candidates = [_candidate(test, k) for k in range(len(test.points))]

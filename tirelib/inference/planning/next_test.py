@@ -1,7 +1,7 @@
 """The next test of strain and of forces: rivals, and possible runs by what they do to them."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -99,10 +99,19 @@ class PairForecast:
 
 @dataclass(frozen=True, slots=True)
 class NextTest:
-    """The possible runs, judged.
+    """The possible runs, judged; none where fewer than two rivals could be fitted.
 
     Attributes
     ----------
+    rivals : tuple of Suspect
+        Suspects on the present runs whose fits have settled.
+    left_out : mapping of str to str
+        Why other suspects are no rivals.
+    size : float
+        Size of the structural misfit; 1 is that of plain tires.
+    random, staying : float
+        Random parts of a run's samples: between repeated runs, and the misfit that a run has for
+        itself, which repeats do not average.
     points : shape (n, axes), SI
         The possible runs on the envelope's axes, best first.
     score, std, probability : shape (n,)
@@ -112,30 +121,23 @@ class NextTest:
         Index of that pair, per run.
     pairs : tuple of PairForecast
         In the order of the points.
-    rivals : tuple of Suspect
-        Suspects on the present runs whose fits have settled.
-    size : float
-        Size of the structural misfit; 1 is that of plain tires.
     dropped : int
         Possible runs at which a rival has no solution.
-    random, staying : float
-        Random parts of a run's samples: between repeated runs, and the misfit that a run has for
-        itself, which repeats do not average.
     """
 
     envelope: Envelope
-    points: FloatArray
-    score: FloatArray
-    std: FloatArray
-    probability: FloatArray
-    hardest: tuple[int, ...]
-    pairs: tuple[PairForecast, ...]
     rivals: tuple[Suspect, ...]
     left_out: Mapping[str, str]
     size: float
-    dropped: int
     random: float
     staying: float
+    points: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    score: FloatArray = field(default_factory=lambda: np.zeros(0))
+    std: FloatArray = field(default_factory=lambda: np.zeros(0))
+    probability: FloatArray = field(default_factory=lambda: np.zeros(0))
+    hardest: tuple[int, ...] = ()
+    pairs: tuple[PairForecast, ...] = ()
+    dropped: int = 0
 
     @property
     def open_pairs(self) -> tuple[PairForecast, ...]:
@@ -225,61 +227,59 @@ def next_test(
     tell = progress or (lambda label: None)
     problem, chosen = _problem(hypotheses), envelope.grid()
     rivals, left_out = _fitted(hypotheses, suspects)
-    points, dropped = np.zeros((0, len(envelope.names))), 0
-    score = std = chance = np.zeros(0)
-    hardest: tuple[int, ...] = ()
-    pairs: tuple[PairForecast, ...] = ()
-    if len(rivals) > 1:
-        fits, names, runs = list(rivals.values()), list(rivals), _Runs(problem, envelope, model)
-        good = runs.possible(fits, chosen)
-        if not good.any():
-            raise ParameterError(
-                f"envelope: the model has no solution at any of its {len(chosen)} runs (tread "
-                "pressed through, or too large a patch); lower the loads of --load-range"
-            )
-        points, dropped = chosen[good], int((~good).sum())
-        tell(f"{len(points)} runs with {' and '.join(rivals)}")
-        alpha = hypotheses.false_alarm
-        parted = next_runs(runs.ahead(points, np.ones(len(points))), fits, alpha)
-        open_ = [k for k, pair in enumerate(parted) if not pair.resolved] or range(len(parted))
-        size = np.array([parted[k].separation for k in open_])
-        told = [parted[k].chance for k in open_ if np.isfinite(parted[k].chance).all()]
-        chance = np.mean(told, axis=0) if told else np.full(len(points), np.nan)
-        least = [open_[k] for k in np.argmin(size, axis=0)]
-        score = np.min(size, axis=0)
-        std = np.array([parted[pair].std[run] for run, pair in enumerate(least)])
-        order = np.lexsort((-score, -np.round(np.nan_to_num(chance), 3)))
-        tell("repeats of the best run")
-        best = np.repeat(points[order[:1]], len(REPEATS) + 1, axis=0)
-        again = next_runs(runs.ahead(best, np.array([*REPEATS, ENDLESS])), fits, alpha)
-        pairs = tuple(
-            PairForecast(
-                (names[pair.first], names[pair.second]),
-                pair.gap,
-                pair.resolved,
-                pair.separation[order],
-                pair.chance[order],
-                dict(zip(REPEATS, repeated.separation.tolist(), strict=False)),
-                float(repeated.separation[-1]),
-            )
-            for pair, repeated in zip(parted, again, strict=True)
-        )
-        points, score, std, chance = points[order], score[order], std[order], chance[order]
-        hardest = tuple(least[k] for k in order)
-    return NextTest(
+    judged = NextTest(
         envelope,
-        points,
-        score,
-        std,
-        chance,
-        hardest,
-        pairs,
         tuple(_suspect(name, rival, hypotheses) for name, rival in rivals.items()),
         left_out,
         hypotheses.base.null.size.whole,
-        dropped,
         float(np.mean(problem.noise)),
         problem.own_misfit(hypotheses.own),
+    )
+    if len(rivals) < 2:
+        return judged
+    fits, names, runs = list(rivals.values()), list(rivals), _Runs(problem, envelope, model)
+    good = runs.possible(fits, chosen)
+    if not good.any():
+        raise ParameterError(
+            f"envelope: the model has no solution at any of its {len(chosen)} runs (tread "
+            "pressed through, or too large a patch); lower the loads of --load-range"
+        )
+    points = chosen[good]
+    tell(f"{len(points)} runs with {' and '.join(rivals)}")
+    alpha = hypotheses.false_alarm
+    parted = next_runs(runs.ahead(points, np.ones(len(points))), fits, alpha)
+    open_ = [k for k, pair in enumerate(parted) if not pair.resolved] or range(len(parted))
+    size = np.array([parted[k].separation for k in open_])
+    told = [parted[k].chance for k in open_ if np.isfinite(parted[k].chance).all()]
+    chance = np.mean(told, axis=0) if told else np.full(len(points), np.nan)
+    least = [open_[k] for k in np.argmin(size, axis=0)]
+    score = np.min(size, axis=0)
+    std = np.array([parted[pair].std[run] for run, pair in enumerate(least)])
+    order = np.lexsort((-score, -np.round(np.nan_to_num(chance), 3)))
+    tell("repeats of the best run")
+    best = np.repeat(points[order[:1]], len(REPEATS) + 1, axis=0)
+    again = next_runs(runs.ahead(best, np.array([*REPEATS, ENDLESS])), fits, alpha)
+    pairs = tuple(
+        PairForecast(
+            (names[pair.first], names[pair.second]),
+            pair.gap,
+            pair.resolved,
+            pair.separation[order],
+            pair.chance[order],
+            dict(zip(REPEATS, repeated.separation.tolist(), strict=False)),
+            float(repeated.separation[-1]),
+        )
+        for pair, repeated in zip(parted, again, strict=True)
+    )
+    return replace(
+        judged,
+        points=points[order],
+        score=score[order],
+        std=std[order],
+        probability=chance[order],
+        hardest=tuple(least[k] for k in order),
+        pairs=pairs,
+        dropped=int((~good).sum()),
     )
 
 
@@ -293,8 +293,7 @@ def _fitted(
     hypotheses: Hypotheses, suspects: Suspects
 ) -> tuple[dict[str, Hypothesis], dict[str, str]]:
     """Return the hypotheses of suspects by name, and why others are left out."""
-    certain = [effect.name for effect, _ in suspects.beside]
-    dead, found, left_out = hypotheses.problem.dead, {}, {}
+    certain, dead, found, left_out = suspects.beside, hypotheses.problem.dead, {}, {}
     for name in suspects.names:
         if name not in hypotheses.effects:
             left_out[name] = dead.get(name, "the model has it")
@@ -326,7 +325,7 @@ def gains(
     nothing is missing is a rival.
     """
     problem = _problem(hypotheses)
-    nothing = hypotheses.at([effect.name for effect, _ in suspects.beside])
+    nothing = hypotheses.at(suspects.beside)
     if not suspects.with_nothing or nothing is None:
         return {}
     limit = nothing.limit(hypotheses.false_alarm)

@@ -224,33 +224,32 @@ def selftest_document(found: SelfTest) -> dict[str, Any]:
 def _summary(found: SelfTest, ratio: float) -> dict[str, Any]:
     """Return the shares over all effects that can be planted at a ratio."""
     done = [p for p in found.plantings if p.ratio == ratio and p.reachable]
-    n = sum(len(p.named) for p in done)
-    counts = {
-        "found": sum(p.right for p in done),
-        "in_set": sum(p.held for p in done),
-        "wrong": sum(p.wrong for p in done),
-        "seen": sum(p.seen for p in done),
-    }
-    shares = {key: count / n if n else None for key, count in counts.items()}
-    return {"ratio": ratio, "effects": len(done), "n": n, **shares}
+    return {"ratio": ratio, "effects": len(done), **_shares(done)}
 
 
 def _result(planting: Planting) -> dict[str, Any]:
-    n = len(planting.named)
-    low, high = chance_range(planting.right, n)
+    low, high = chance_range(planting.right, len(planting.named))
     return {
         "ratio": planting.ratio,
         "strength": planting.strength,
         "reachable": planting.reachable,
-        "n": n,
-        "found": planting.right / n if n else None,
+        **_shares([planting]),
         "found_low": low,
         "found_high": high,
-        "in_set": planting.held / n if n else None,
-        "wrong": planting.wrong / n if n else None,
-        "seen": planting.seen / n if n else None,
         "named": sorted({name for names in planting.named for name in names}),
     }
+
+
+def _shares(plantings: Sequence[Planting]) -> dict[str, Any]:
+    """Return the number of tires in which effects were planted, and the shares of what was said."""
+    n = sum(len(p.named) for p in plantings)
+    counts = {
+        "found": sum(p.right for p in plantings),
+        "in_set": sum(p.held for p in plantings),
+        "wrong": sum(p.wrong for p in plantings),
+        "seen": sum(p.seen for p in plantings),
+    }
+    return {"n": n, **{key: count / n if n else None for key, count in counts.items()}}
 
 
 def chance_range(right: int, n: int) -> tuple[float, float]:

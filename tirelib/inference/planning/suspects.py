@@ -5,16 +5,11 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
-import numpy as np
-
-from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
 from tirelib.effects import Effect
 
 MOST_SUSPECTS = 3
 """Suspects taken at most."""
-START = 0.1
-"""Start of a strength where none is known, relative to the range."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +18,8 @@ class Suspects:
 
     Attributes
     ----------
-    effects : tuple of (effect, start strength)
-    beside : tuple of (effect, start strength)
+    names : tuple of str
+    beside : tuple of str
         Named effects that nobody doubts; the model needs them.
     with_nothing : bool
         Whether that none of them acts is possible too.
@@ -32,15 +27,10 @@ class Suspects:
         In words.
     """
 
-    effects: tuple[tuple[Effect, FloatArray], ...]
-    beside: tuple[tuple[Effect, FloatArray], ...]
+    names: tuple[str, ...]
+    beside: tuple[str, ...]
     with_nothing: bool
     why: str
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the suspects."""
-        return tuple(effect.name for effect, _ in self.effects)
 
 
 def suspects_of(told: Mapping[str, Any], catalogue: Mapping[str, Effect]) -> Suspects:
@@ -67,7 +57,7 @@ def suspects_of(told: Mapping[str, Any], catalogue: Mapping[str, Effect]) -> Sus
         every = dict.fromkeys(name for names in sets for name in names)
         differ = [name for name in every if not all(name in names for names in sets)]
         why = "the campaign cannot distinguish them"
-        return _of(differ[:MOST_SUSPECTS], common, entries, catalogue, False, why)
+        return _known(differ[:MOST_SUSPECTS], common, catalogue, False, why)
     for name in named:
         twins = [twin["effect"] for twin in entries.get(name, {}).get("twins", [])]
         doubtful = [twin for twin in twins if twin in alive and twin not in named]
@@ -76,36 +66,31 @@ def suspects_of(told: Mapping[str, Any], catalogue: Mapping[str, Effect]) -> Sus
             rivals = " and ".join(doubtful[: MOST_SUSPECTS - 1])
             why = f"{name} is named, and looks much like {rivals}"
             chosen = [name, *doubtful][:MOST_SUSPECTS]
-            return _of(chosen, others, entries, catalogue, False, why)
+            return _known(chosen, others, catalogue, False, why)
     if named or not alive:
         why = "nothing is in doubt"
         if named:
             why += f"; for a run that would confirm {named[0]} give --suspects {named[0]}"
         return Suspects((), (), False, why)
     why = f"no more than a hint: {', '.join(alive[:MOST_SUSPECTS])}"
-    return _of(alive[:MOST_SUSPECTS], [], entries, catalogue, True, why)
+    return _known(alive[:MOST_SUSPECTS], [], catalogue, True, why)
 
 
-def _of(
+def _known(
     names: Sequence[str],
     beside: Sequence[str],
-    entries: Mapping[str, Mapping[str, Any]],
     catalogue: Mapping[str, Effect],
     with_nothing: bool,
     why: str,
 ) -> Suspects:
-    def pair(name: str) -> tuple[Effect, FloatArray]:
+    """Return suspects of a diagnosis; raise ParameterError if the catalogue lacks one."""
+    for name in (*names, *beside):
         if name not in catalogue:
             raise ParameterError(
                 f"the diagnosis names {name!r}, which is not known; load the file that defines it "
                 "with --effects, or diagnose again"
             )
-        effect, strength = catalogue[name], entries.get(name, {}).get("strength")
-        if strength is None:
-            return effect, np.full(effect.components, START * effect.toward)
-        return effect, np.atleast_1d(np.asarray(strength, dtype=float))
-
-    return Suspects(tuple(map(pair, names)), tuple(map(pair, beside)), with_nothing, why)
+    return Suspects(tuple(names), tuple(beside), with_nothing, why)
 
 
 def given_suspects(
@@ -143,7 +128,7 @@ def given_suspects(
         faults.append(f"{len(names)} effects are given; 1 to {MOST_SUSPECTS} are allowed")
     if faults:
         raise ParameterError(f"suspects: {'; '.join(faults)}; correct --suspects")
-    return _of(names, [], {}, catalogue, len(names) == 1, "given")
+    return Suspects(tuple(names), (), len(names) == 1, "given")
 
 
 def _nearest(name: str, catalogue: Mapping[str, Effect]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import ParameterError
+from tirelib.inference.identify.error_bands import numbered
 from tirelib.inference.identify.force_points import CELL_ANGLE, CELL_RATIO, ForcePoints, set_points
 
 FEWEST_SLIPS = 4
@@ -118,8 +119,6 @@ def _runs(points: ForcePoints) -> IntArray:
 
 def _once(name: str, slip: FloatArray, cell: IntArray, rate: FloatArray) -> Sweep:
     """Return every slip once in each direction, means over a run's visits."""
-    key = np.stack([cell, np.sign(rate).astype(np.int64)])
-    _, number = np.unique(key, axis=1, return_inverse=True)
-    number = np.asarray(number).ravel()
+    number = numbered(cell, np.sign(rate))
     count = np.bincount(number)
     return Sweep(name, np.bincount(number, slip) / count, np.bincount(number, rate) / count)

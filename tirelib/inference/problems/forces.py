@@ -14,15 +14,29 @@ from tirelib.core.arrays import BoolArray, FloatArray, IntArray
 from tirelib.core.errors import TirelibError
 from tirelib.effects import Effect
 from tirelib.effects.brush_state import BrushState
+from tirelib.inference.identify.brush_fit import LOAD_RATIO
+from tirelib.inference.identify.brush_law import SPECS
 from tirelib.inference.identify.discrepancy import bumps
 from tirelib.inference.identify.force_bench import Changes, ForceBench
-from tirelib.inference.problems.force_constants import fitted_constants, moved_constants
 from tirelib.inference.problems.force_plan import SPANS, blind, varies
 from tirelib.inference.problems.whiten_forces import PointWhitener
 from tirelib.inference.statistics.problem import Point
 from tirelib.model.brush import brush_forces
 from tirelib.model.brush_slopes import STATE_STEP, StateSlopes, moment_of
 
+COORDINATES: Mapping[str, tuple[str, ...]] = {
+    "Fy": ("lateral_stiffness", "friction", "load_power", "slip_angle_offset", "Fy_offset"),
+    "Fx": ("longitudinal_stiffness", "friction", "load_power", "slip_ratio_offset", "Fx_offset"),
+    "Mz": (
+        "lateral_stiffness",
+        "friction",
+        "half_length",
+        "load_power",
+        "slip_angle_offset",
+        "Mz_offset",
+    ),
+}
+"""Constants of the brush that are fitted with each force; the others stay as the model has them."""
 WIDTH = 1.0
 """Prior standard deviation of a coordinate."""
 SET_POINTS = {"load": 0.005, "pressure": 0.005, "slip_ratio": 0.01}
@@ -95,7 +109,9 @@ class ForceProblem:
         self.bench, self.quantity, self.values = bench, quantity, dict(values)
         self.measured: FloatArray = getattr(bench.points.data, quantity)
         load = bench.conditions.load
-        self.names = fitted_constants(bench, quantity)
+        of_contact = ("half_length", "load_power") if bench.half is not None else ()
+        held = of_contact if load.max() >= LOAD_RATIO * load.min() else (*of_contact, "load_power")
+        self.names = tuple(name for name in COORDINATES[quantity] if name not in held)
         self.start = Point(np.zeros(len(self.names)), tuple(effects), tuple(strengths))
         self.starts = (self.start,)
         self.widths = np.full(len(self.names), WIDTH)
@@ -167,14 +183,7 @@ class ForceProblem:
         return OWN * own * float(np.mean(self.size[: self.present]))
 
     def part(self, chosen: BoolArray, start: Point) -> "ForceProblem":
-        """Return the problem of some of the points (n,), without effects that may be missing.
-
-        Parameters
-        ----------
-        chosen : shape (n,)
-        start : Point
-            The model.
-        """
+        """Return the problem of some of the points (n,), without effects that may be missing."""
         out = copy(self)
         out.bench, out.measured = self.bench.take(chosen), self.measured[chosen]
         out.size, out.noise, out.slip = self.size[chosen], self.noise[chosen], self.slip[chosen]
@@ -196,7 +205,9 @@ class ForceProblem:
 
     def constants(self, point: Point) -> dict[str, float]:
         """Return the brush's constants at a point."""
-        return moved_constants(self.values, self.names, point.base)
+        pairs = zip(self.names, point.base.tolist(), strict=True)
+        moved = {k: SPECS[k].moved(self.values.get(k, 0.0), move) for k, move in pairs}
+        return self.values | moved
 
     def thinned(self) -> "ForceProblem":
         """Return the problem itself: a fit to forces costs little."""
@@ -314,12 +325,8 @@ class ForceProblem:
                 points=replace(points, data=replace(points.data, **{name: moved})),
                 conditions=replace(at, **{name: moved}),
             )
-            state = bench.state(self.values)
-            for _, change in changes_at(self.start.effects, self.start.strengths):
-                state = change(state)
-            columns.append(
-                np.nan_to_num(getattr(brush_forces(state), self.quantity) - solved.force)
-            )
+            found = bench.forces(self.values, changes_at(self.start.effects, self.start.strengths))
+            columns.append(np.nan_to_num(getattr(found, self.quantity) - solved.force))
         return np.stack(columns, axis=1)
 
     def _alive(self, catalogue: Sequence[Effect], solved: ForceSolved) -> tuple[Effect, ...]:
@@ -374,7 +381,4 @@ def slip_of(state: BrushState, quantity: str) -> FloatArray:
 
 def changes_at(effects: Sequence[Effect], strengths: Sequence[FloatArray]) -> Changes:
     """Return effects at strengths as changes of the brush."""
-    return [
-        effect.at(float(s[0]) if effect.components == 1 else tuple(float(x) for x in s))
-        for effect, s in zip(effects, strengths, strict=True)
-    ]
+    return [effect.at(each) for effect, each in zip(effects, strengths, strict=True)]

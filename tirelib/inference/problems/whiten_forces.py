@@ -67,10 +67,6 @@ class PointWhitener:
             parts.append((index, lower, np.asarray(np.linalg.inv(lower))))
         return cls(tuple(parts), volume)
 
-    def __call__(self, rows: FloatArray) -> FloatArray:
-        """Return whitened rows (..., n)."""
-        return self.white(rows)
-
     def reduced(self, rows: FloatArray) -> FloatArray:
         """Return rows as they are: every number of a force counts."""
         return rows
@@ -81,6 +77,8 @@ class PointWhitener:
         for index, _, inverse in self.parts:
             out[..., index] = rows[..., index] @ inverse.T
         return out
+
+    __call__ = white
 
     def coloured(self, white: FloatArray) -> FloatArray:
         """Return forces (k, n) whose whitened rows are these."""

@@ -10,7 +10,13 @@ from tirelib.core.parameters import Number, TireFile
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.effects.effect import Strength
 from tirelib.inference.compare.model import TireModel, model_of
-from tirelib.inference.extend.extension import Extension, extended, refuse, strain_models
+from tirelib.inference.extend.extension import (
+    Extension,
+    StrainCase,
+    extended,
+    models_of,
+    refuse,
+)
 from tirelib.inference.extend.model_file import extended_file
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.measured.waveforms import Waveforms
@@ -66,7 +72,10 @@ def model_file(*effects: tuple[str, float]) -> TireFile:
 def add_effect(measured: StraightRuns, model: TireModel, effect: Effect) -> Extension:
     """Return a model with one effect more, fitted to runs."""
     refuse(model, effect)
-    return extended(strain_models(measured, model, [effect]), model, effect)
+    case = StrainCase(measured, model)
+    found = extended(models_of(case, [effect]), case, effect)
+    assert isinstance(found, Extension)
+    return found
 
 
 @cache

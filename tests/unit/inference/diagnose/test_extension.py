@@ -20,7 +20,7 @@ from tirelib.effects import CATALOGUE
 from tirelib.inference.compare.error import error_of
 from tirelib.inference.compare.model import model_of
 from tirelib.inference.extend.document import extension_document
-from tirelib.inference.extend.extension import known_effect, remove_effect
+from tirelib.inference.extend.extension import StrainCase, known_effect, without_effect
 from tirelib.inference.extend.model_file import extended_file, undone_file
 
 
@@ -125,7 +125,7 @@ def test_undo_restores_every_digit(tmp_path: Path) -> None:
 
 def test_removing_restores_the_fit_without_the_effect() -> None:
     done, file = added()
-    out = remove_effect(runs(EFFECT, STRENGTH), model_of(file), CATALOGUE[EFFECT])
+    out = without_effect(StrainCase(runs(EFFECT, STRENGTH), model_of(file)), CATALOGUE[EFFECT])
     assert out.after.effects == ()
     # both are the bottom of one cost; wide priors about different starts move it by little
     assert out.after.error == pytest.approx(done.before.error, rel=0.02)
@@ -148,7 +148,7 @@ def test_what_strain_cannot_have_is_refused_with_the_reason() -> None:
     with pytest.raises(CalibrationError, match="no run has a camber"):
         add_effect(runs(), model, CATALOGUE["camber"])
     with pytest.raises(ParameterError, match="no effect 'camber'"):
-        remove_effect(runs(), model, CATALOGUE["camber"])
+        without_effect(StrainCase(runs(), model), CATALOGUE["camber"])
 
 
 def test_a_misspelt_effect_is_answered_with_the_nearest() -> None:

@@ -15,7 +15,7 @@ from tirelib.inference.diagnose.forces.diagnose import diagnose_force
 from tirelib.inference.diagnose.forces.models import ForceModels
 from tirelib.inference.diagnose.held_out import Fold, force_folds, pooled
 from tirelib.inference.diagnose.left import force_left
-from tirelib.inference.extend.extension import force_models
+from tirelib.inference.extend.extension import models_of
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.identify.force_points import force_points
 from tirelib.inference.problems.forces import WIDTH
@@ -73,7 +73,7 @@ def test_cells_are_held_out_where_no_set_point_can_be_spared() -> None:
 
 def test_what_is_held_out_does_not_move_the_fit_that_predicts_it() -> None:
     made = case()
-    models = force_models(made)
+    models = models_of(made)
     fit, (fold,) = models.at(), models.folds
     (near,) = models.held_out(fit)
     models.problem.measured = models.problem.measured + 1e4 * fold.out
@@ -83,7 +83,7 @@ def test_what_is_held_out_does_not_move_the_fit_that_predicts_it() -> None:
 
 
 def test_no_other_numbers_leave_less_than_a_fitted_brush() -> None:
-    models = force_models(case(friction_power=-0.15))
+    models = models_of(case(friction_power=-0.15))
     problem, scale = models.problem, models.case.scale
     fit = models.with_effect(models.at(), CATALOGUE["friction_pressure"])
 
@@ -137,7 +137,7 @@ def test_the_held_out_error_is_over_the_points_of_the_folds_that_count() -> None
 
 
 def test_what_is_left_is_told_by_slip_and_load_with_a_guess() -> None:
-    left = force_left(force_models(case(friction_power=-0.15)).at())
+    left = force_left(models_of(case(friction_power=-0.15)).at())
     assert left.guess is not None
     assert "ln load" in left.guess
     taken = re.search(r"takes away (\d+) %", left.guess)

@@ -16,7 +16,7 @@ from tirelib.inference.compare.model import model_of
 from tirelib.inference.diagnose.assess import ForceAssessment
 from tirelib.inference.diagnose.diagnose import Diagnosis, diagnose
 from tirelib.inference.extend.additions import additions
-from tirelib.inference.extend.extension import extended
+from tirelib.inference.extend.extension import StrainCase, extended
 from tirelib.inference.statistics import hypotheses
 from tirelib.journey import add
 from tirelib.journey import diagnose as diagnose_model
@@ -105,8 +105,9 @@ def test_strain_takes_over_the_fits_of_the_diagnosis(
     pair: Diagnosis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(hypotheses, "posterior", None)  # no hypothesis is fitted again
-    first = extended(pair.models, model_of(model_file()), CATALOGUE[EFFECT])
-    both = extended(pair.models, model_of(model_file()), CATALOGUE["gage_length"], first.after)
+    case = StrainCase(pair.models.runs, model_of(model_file()))
+    first = extended(pair.models, case, CATALOGUE[EFFECT])
+    both = extended(pair.models, case, CATALOGUE["gage_length"], first.after)
     assert first.before is pair.base
     assert both.before is first.after
     assert both.given.value == pytest.approx(first.reached.value, rel=1e-6)

@@ -15,10 +15,10 @@ from tirelib.inference.extend.document import extension_document
 from tirelib.inference.extend.extension import (
     ForceExtension,
     case_for,
-    extended_brush,
-    force_models,
-    refuse_brush,
-    remove_brush_effect,
+    extended,
+    models_of,
+    refuse,
+    without_effect,
 )
 from tirelib.inference.extend.model_file import extended_file, undone_file
 from tirelib.journey import add
@@ -41,8 +41,8 @@ def case(tmp_path_factory: pytest.TempPathFactory, model: TireFile) -> ForceCase
 
 
 def add_brush_effect(case: ForceCase, effect: Effect) -> ForceExtension:
-    refuse_brush(case, effect)
-    return extended_brush(force_models(case, [effect]), case, effect)
+    refuse(case.model, effect)
+    return extended(models_of(case, [effect]), case, effect)
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +134,7 @@ def test_a_needless_effect_is_flagged(model: TireFile, tmp_path: Path) -> None:
 
 def test_an_effect_is_added_once_and_only_what_is_there_is_removed(case: ForceCase) -> None:
     with pytest.raises(ParameterError, match="no effect 'carcass' of the brush"):
-        remove_brush_effect(case, CATALOGUE["carcass"])
+        without_effect(case, CATALOGUE["carcass"])
     with pytest.raises(ParameterError, match="acts on strain"):
         add_brush_effect(case, CATALOGUE["camber"])
 

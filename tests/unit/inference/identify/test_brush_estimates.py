@@ -40,7 +40,7 @@ def test_intervals_hold_the_stiffness_and_friction_of_another_kind_of_tire() -> 
         rng = np.random.default_rng(seed)
         tire = magic(rng)
         data = magic_data(tire, rng, RATIOS if seed % 3 == 0 else ())
-        study = study_of(fit_brush(data), data)
+        study = study_of(fit_brush(data))
         for name, each in inside(study, tire).items():
             hits.setdefault(name, []).extend(each)
         # what the points' scatter alone says is far too sure of itself
@@ -56,7 +56,7 @@ def test_intervals_hold_the_stiffness_and_friction_of_another_kind_of_tire() -> 
 def test_a_brush_is_recognised_as_one() -> None:
     """Its own misfit is noise: intervals are narrow and hold the truth."""
     data = make(WIDE, noise=20.0, seed=3)
-    study = study_of(fit_brush(data), data)
+    study = study_of(fit_brush(data))
     by_name = {each.name: each for each in estimates_of(study)}
     # c_py is C over the square of the contact length: twice its error
     for name, widest in (("lateral_stiffness", 0.3), ("friction", 0.1), ("half_length", 0.15)):
@@ -71,7 +71,7 @@ def test_a_brush_is_recognised_as_one() -> None:
 
 
 def told(data: ForceData, **options: object) -> tuple[Study, dict[str, str]]:
-    study = study_of(fit_brush(data, **options), data)
+    study = study_of(fit_brush(data, **options))
     return study, advice(study)
 
 
@@ -102,7 +102,7 @@ def test_what_nothing_helps_is_said_to_be_the_misfit() -> None:
 
 def test_a_half_length_that_no_tire_has_is_flagged() -> None:
     data = make(WIDE)
-    study = study_of(fit_brush(data), data)
+    study = study_of(fit_brush(data))
     flags = {
         radius: next(e for e in estimates_of(study, free_radius=radius) if e.name == "half_length")
         for radius in (0.08, 0.3)
@@ -114,7 +114,7 @@ def test_a_half_length_that_no_tire_has_is_flagged() -> None:
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_rigid_carcass_stands_at_its_boundary(seed: int) -> None:
     data = make(WIDE, noise=20.0, yaw_compliance=1.2e-3, seed=seed)
-    study = study_of(fit_brush(data, free=("yaw_compliance",)), data)
+    study = study_of(fit_brush(data, free=("yaw_compliance",)))
     each = next(e for e in estimates_of(study) if e.name == "yaw_compliance")
     assert "at_boundary" in each.flags
     assert each.high <= 5e-4

@@ -75,7 +75,7 @@ def test_a_brush_alone_is_written_and_read_to_the_last_digit(tmp_path: Path) -> 
     for name in ("Fx", "Fy", "Mz"):
         np.testing.assert_allclose(getattr(found.predict(DATA), name), getattr(wanted, name))
     half = 0.061 * (DATA.load / 2500.0) ** 0.45 * (DATA.pressure / 1.3e5) ** -0.3
-    np.testing.assert_allclose(found.half_length(DATA), half)
+    np.testing.assert_allclose(found.parameters(DATA).half_length, half)
 
 
 def test_a_rigid_carcass_survives(tmp_path: Path) -> None:
@@ -89,11 +89,11 @@ def test_without_a_half_length_the_ring_gives_it() -> None:
     found = brush_of(tire_file(plain, ring=True))
     assert found.tire == tire_file(plain, ring=True).tire
     np.testing.assert_allclose(
-        found.half_length(DATA), half_lengths(found.tire, DATA.load, DATA.pressure)
+        found.parameters(DATA).half_length, half_lengths(found.tire, DATA.load, DATA.pressure)
     )
     own = brush_of(tire_file({**plain, "half_length": 0.05}, ring=True))
     assert own.tire is None
-    np.testing.assert_allclose(own.half_length(DATA), 0.05)
+    np.testing.assert_allclose(own.parameters(DATA).half_length, 0.05)
 
 
 def test_a_file_without_brush_says_so() -> None:

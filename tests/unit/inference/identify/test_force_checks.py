@@ -45,7 +45,7 @@ def test_a_force_of_the_wrong_sign_is_named(data: ForceData, name: str) -> None:
 
 def test_advice_asks_for_no_slip_angle_that_no_rig_has(data: ForceData) -> None:
     """Where friction is open, full sliding lies anywhere."""
-    study = study_of(fit_brush(data), data)
+    study = study_of(fit_brush(data))
     stiff = replace(study, stiffness={k: 0.05 * v for k, v in study.stiffness.items()})
     assert np.rad2deg(stiff.slide["slip_angle"]) > LARGEST_ANGLE
     largest = max(float(np.abs(each.data.slip_angle).max()) for each in candidates(stiff))

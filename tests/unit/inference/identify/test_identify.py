@@ -17,7 +17,7 @@ from tirelib.core.errors import CalibrationError
 from tirelib.core.parameters import Number, TireFile, read_tire
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.inference.identify.estimate import Estimate
-from tirelib.inference.identify.identify import estimated, start_file
+from tirelib.inference.identify.identify import estimates_of, fitted, start_file
 from tirelib.inference.identify.structure import STRUCTURE_STD, WITHOUT_SHEAR
 from tirelib.model.base import BARE, PLAIN
 
@@ -31,7 +31,7 @@ def runs() -> StraightRuns:
 
 @pytest.fixture(scope="module")
 def estimates(runs: StraightRuns) -> dict[str, Estimate]:
-    return {e.name: e for e in estimated(runs, base="dissertation")[2]}
+    return {e.name: e for e in estimates_of(*fitted(runs, base="dissertation"))}
 
 
 def test_true_values_lie_in_the_intervals(estimates: dict[str, Estimate]) -> None:
@@ -73,7 +73,9 @@ def test_the_help_tells_the_widths_now_and_then(estimates: dict[str, Estimate]) 
 def test_one_pressure_tells_no_slopes() -> None:
     found = {
         e.name: e
-        for e in estimated(straight_runs(made_waves(pressures=(2.1e5,))), base="dissertation")[2]
+        for e in estimates_of(
+            *fitted(straight_runs(made_waves(pressures=(2.1e5,))), base="dissertation")
+        )
     }
     slope = found["radial_pressure_slope"]
     assert "not_identifiable" in slope.flags
@@ -84,7 +86,7 @@ def test_one_pressure_tells_no_slopes() -> None:
 
 def test_one_pressure_tells_nothing_of_an_offset_that_goes_with_it() -> None:
     runs = straight_runs(made_waves(pressures=(2.1e5,)))
-    (slope,) = (e for e in estimated(runs)[2] if e.name == "offset_pressure_slope")
+    (slope,) = (e for e in estimates_of(*fitted(runs)) if e.name == "offset_pressure_slope")
     assert slope.value == 0.0
     assert slope.fit_std == pytest.approx(0.03, rel=1e-3), "the prior's"
     assert "not_identifiable" in slope.flags
@@ -123,7 +125,7 @@ def test_a_given_tire_is_moved_to_the_pressure_of_the_campaign(runs: StraightRun
 
 def test_without_loaded_radius_and_repeats_it_works() -> None:
     waves = made_waves(loads=LOADS[::2], repeats=0, radius=False)
-    for e in estimated(straight_runs(waves), base="dissertation")[2]:
+    for e in estimates_of(*fitted(straight_runs(waves), base="dissertation")):
         assert e.low < getattr(TIRE, e.name) < e.high
 
 
@@ -131,7 +133,7 @@ def test_a_value_far_from_its_prior_is_at_a_boundary(runs: StraightRuns) -> None
     given = {"bending_stiffness": Number(1.0, 0.05, "measured", "a wrong test")}
     start = start_file(header(), runs, None)
     wrong = replace(start, numbers={**start.numbers, **given})
-    found = {e.name: e for e in estimated(runs, wrong, base="dissertation")[2]}
+    found = {e.name: e for e in estimates_of(*fitted(runs, wrong, base="dissertation"))}
     assert "at_boundary" in found["bending_stiffness"].flags
 
 

@@ -11,7 +11,6 @@ from tirelib.campaign import read_campaign
 from tirelib.core.errors import CalibrationError, ParameterError
 from tirelib.core.parameters import Tire, read_tire
 from tirelib.inference.identify.force_data import ForceData, force_data
-from tirelib.inference.identify.forces import _compared
 from tirelib.inference.identify.lateral_force import KINDS, PressureBand, compare_pressures
 from tirelib.inference.identify.ring_patch import profiles, ring_contact
 from tirelib.physics.brush.forces import brush_forces
@@ -57,11 +56,11 @@ def pick(table: tuple[PressureBand, ...], by: str) -> list[PressureBand]:
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_pressure_wins_on_its_own_forces(kind: str, stiffness: str) -> None:
     found = compare_pressures(forces(kind), TIRE, stiffness=stiffness)
-    np.testing.assert_allclose(found.stiffness[kind], C, rtol=1e-4)
-    assert found.stiffness[kind].size == (4 if stiffness == "each" else 1)
-    assert found.values[kind]["friction"] == pytest.approx(MU, rel=1e-4)
-    assert found.values[kind]["Fy_offset"] == pytest.approx(OFFSET, abs=0.1)
-    assert found.values[kind]["slip_angle_offset"] == pytest.approx(0.0, abs=1e-5)
+    fitted = found.fits[kind]
+    np.testing.assert_allclose(fitted.stiffness, C, rtol=1e-4)
+    assert fitted.values["friction"] == pytest.approx(MU, rel=1e-4)
+    assert fitted.values["Fy_offset"] == pytest.approx(OFFSET, abs=0.1)
+    assert fitted.values["slip_angle_offset"] == pytest.approx(0.0, abs=1e-5)
     all_points = found.table[0]
     fit = {"ring": all_points.ring_rmse, "parabola": all_points.parabola_rmse}
     unseen = {"ring": all_points.ring_rmse_unseen, "parabola": all_points.parabola_rmse_unseen}
@@ -76,12 +75,12 @@ def test_stiffness_of_each_condition_is_found() -> None:
     stiffness = np.where(data.load > 3000.0, 7e6, 9e6) * np.where(data.pressure > 1.3e5, 1.1, 1.0)
     measured = forces("ring", stiffness)
     found = compare_pressures(measured, TIRE)
-    np.testing.assert_allclose(found.stiffness["ring"][found.condition], stiffness, rtol=1e-4)
+    np.testing.assert_allclose(found.fits["ring"].stiffness, stiffness, rtol=1e-4)
     assert found.table[0].ring_rmse < 0.5
     one = compare_pressures(measured, TIRE, stiffness="one")
     assert one.table[0].ring_rmse > 20.0
     # a force that is too large in size is so to either side
-    larger = np.abs(one.predicted["ring"]) - np.abs(measured.Fy)
+    larger = np.abs(one.fits["ring"].predicted) - np.abs(measured.Fy)
     assert one.table[0].ring_bias == pytest.approx(larger.mean())
 
 
@@ -90,8 +89,8 @@ def test_unseen_points_are_predicted_by_the_others() -> None:
     Fy = clean.Fy.copy()
     Fy[17] += 1500.0
     found = compare_pressures(replace(clean, Fy=Fy), TIRE)
-    assert found.unseen["ring"][17] == pytest.approx(clean.Fy[17], abs=1.0)
-    assert abs(found.predicted["ring"][17] - clean.Fy[17]) > 20.0
+    assert found.fits["ring"].unseen[17] == pytest.approx(clean.Fy[17], abs=1.0)
+    assert abs(found.fits["ring"].predicted[17] - clean.Fy[17]) > 20.0
 
 
 def test_unseen_loads_are_predicted_by_the_other_loads() -> None:
@@ -101,22 +100,13 @@ def test_unseen_loads_are_predicted_by_the_other_loads() -> None:
     mixed = forces("ring", np.where(at.load > 3000.0, 0.5 * C, C)).take(low)
     found = compare_pressures(mixed, TIRE, stiffness="one")
     high = mixed.load > 3000.0
-    np.testing.assert_allclose(found.unseen["ring"][high], stiff.Fy[high], atol=2.0)
+    np.testing.assert_allclose(found.fits["ring"].unseen[high], stiff.Fy[high], atol=2.0)
 
 
 def test_camber_is_worth_a_slip_angle() -> None:
     found = compare_pressures(forces("ring", camber=0.05), TIRE)
-    assert found.values["ring"]["camber_thrust"] == pytest.approx(0.1, rel=1e-3)
-    assert compare_pressures(forces("ring"), TIRE).values["ring"]["camber_thrust"] == 0.0
-
-
-def test_what_is_held_is_not_fitted() -> None:
-    held = {"friction": 0.8, "lateral_stiffness": C, "slip_angle_offset": 0.0, "Fy_offset": 0.0}
-    found = compare_pressures(forces("ring"), TIRE, held=held)
-    for kind in KINDS:
-        assert found.values[kind]["friction"] == 0.8
-        np.testing.assert_array_equal(found.stiffness[kind], C)
-        np.testing.assert_array_equal(found.predicted[kind], found.unseen[kind])
+    assert found.fits["ring"].values["camber_thrust"] == pytest.approx(0.1, rel=1e-3)
+    assert "camber_thrust" not in compare_pressures(forces("ring"), TIRE).fits["ring"].values
 
 
 def test_a_load_without_slip_angles_is_left_out_and_said() -> None:
@@ -124,23 +114,14 @@ def test_a_load_without_slip_angles_is_left_out_and_said() -> None:
     data = forces("ring")
     straight = np.abs(data.slip_angle) < 1e-9
     sparse = data.take(straight | (data.load < 3000.0))
-    notes: list[str] = []
-    found = _compared(sparse, TIRE, notes)
-    assert found is not None
+    found = compare_pressures(sparse, TIRE)
     assert found.table[0].points == 26
-    assert notes == [
-        "ring pressure against parabola: 2 of 28 points are left out, their load and pressure hold "
-        "fewer than 4 points or less than 1 deg of slip angle"
-    ]
-    assert _compared(data.take(straight | (data.slip_angle > 0.1)), TIRE, notes) is None
-
-
-def test_bias_says_overestimate() -> None:
-    """With friction held too low, both predict too small a force at large slip."""
-    low = compare_pressures(forces("ring"), TIRE, held={"friction": 0.7})
-    last = pick(low.table, "slip_angle")[-1]
-    assert last.ring_bias < -100.0
-    assert last.parabola_bias < -100.0
+    assert found.notes == (
+        "2 of 28 points are left out, their load and pressure hold fewer than 4 points or less "
+        "than 1 deg of slip angle",
+    )
+    with pytest.raises(CalibrationError, match="12 of 12 points are left out"):
+        compare_pressures(data.take(straight | (data.slip_angle > 0.1)), TIRE)
 
 
 def test_table_has_every_band_of_load_pressure_and_slip_angle() -> None:
@@ -172,9 +153,9 @@ def test_profiles_share_load_and_edges() -> None:
 @pytest.mark.parametrize(
     ("change", "options", "error", "message"),
     [
-        ({"Fy": np.nan}, {}, CalibrationError, "Fy is not measured at 52 of 52"),
-        ({"slip_ratio": 0.1}, {}, CalibrationError, "slip ratio of 0.1; freely rolling"),
-        ({"slip_angle": 0.0}, {}, CalibrationError, "the slip angle does not vary|span 0 deg"),
+        ({"Fy": np.nan}, {}, CalibrationError, "no freely rolling runs over slip angle with Fy"),
+        ({"slip_ratio": 0.1}, {}, CalibrationError, "no freely rolling runs"),
+        ({"slip_angle": 0.0}, {}, CalibrationError, "no freely rolling runs over slip angle"),
         ({}, {"stiffness": "some"}, ParameterError, "allowed are 'each' and 'one'"),
     ],
 )
@@ -187,10 +168,11 @@ def test_what_cannot_be_compared_is_refused(
         compare_pressures(changed, TIRE, **options)
 
 
-def test_too_many_points_are_refused() -> None:
+def test_of_many_points_some_are_compared() -> None:
     data = forces("ring")
-    with pytest.raises(CalibrationError, match="2080 points; allowed are 2000"):
-        compare_pressures(data.take(np.tile(np.arange(52), 40)), TIRE)
+    found = compare_pressures(data.take(np.tile(np.arange(52), 12)), TIRE)
+    assert found.table[0].points == 208  # each third of 624
+    assert found.table[0].ring_rmse < 0.5
 
 
 RIG = Tire(
@@ -213,7 +195,7 @@ RIG = Tire(
 
 
 def test_ring_pressure_serves_the_rig_better_at_one_load(tmp_path: Path) -> None:
-    """A tire of another structure; no parameter was fitted to it but c_py and mu."""
+    """A tire of another structure; c_py, mu and two offsets are fitted to it."""
     angles = np.radians([0.0, 1.0, 2.0, 3.0, 4.0, 6.0])
     plan = Plan(
         "part", "one load", tuple(Condition(6720.0, 2.1e5, 18.0, slip_angle=a) for a in angles)
@@ -221,8 +203,7 @@ def test_ring_pressure_serves_the_rig_better_at_one_load(tmp_path: Path) -> None
     run_plan(plan, RigTire(), tmp_path / "rig", seed=2, repeats=0, jobs=1)
     data = force_data(read_campaign(tmp_path / "rig"))
     assert len(data) == 6
-    held = {"slip_angle_offset": 0.0, "Fy_offset": 0.0}
-    found = compare_pressures(data, RIG, held=held).table[0]
+    found = compare_pressures(data, RIG).table[0]
     assert found.ring_rmse < 0.7 * found.parabola_rmse
     # load cells: 30 N a sample, set points 0.017 deg of 1500 N/deg: 26 N
     assert found.ring_rmse < 60.0

@@ -77,21 +77,22 @@ def test_a_run_does_what_was_predicted(data: Data, fit: WaveformFit, ways: NextR
     """The fit of the campaign with the advised run has the interval that was told before."""
     advice = ways.best_run(K_U_SLOPE)
     assert advice is not None
-    run = next(r for r in ways.runs[K_U_SLOPE] if r.effort == 1)
+    single = (each for each in ways.runs if each.effort == 1)
+    run = min(single, key=lambda each: each.half_width[K_U_SLOPE])
     load, pressure, speed = (
         float(word) for word in np.array(run.words.replace(",", "").split())[[4, 6, 8]]
     )
     assert min(abs(pressure * 1e5 - 2.1e5), 1e9) > 3e4, "another pressure tells the slope"
     again = fit_of(added(data, load, 1e5 * (1.68 if pressure < 2.0 else 2.52), speed / 3.6))
     found = 1.96 * np.hypot(np.sqrt(again.covariance[K_U_SLOPE, K_U_SLOPE]), STRUCTURE[K_U_SLOPE])
-    assert run.half_width == pytest.approx(found, rel=0.1)
-    assert run.half_width < 0.4 * ways.half_width[K_U_SLOPE]
+    assert run.half_width[K_U_SLOPE] == pytest.approx(found, rel=0.1)
+    assert run.half_width[K_U_SLOPE] < 0.4 * ways.half_width[K_U_SLOPE]
 
 
 def test_structure_is_no_runs_business(ways: NextRun) -> None:
     for k in (K_V, K_T):
         assert ways.best_run(k) is None
-        assert all(run.half_width >= 1.96 * STRUCTURE[k] for run in ways.runs[k])
+        assert all(run.half_width[k] >= 1.96 * STRUCTURE[k] for run in ways.runs)
 
 
 def test_a_test_by_definition_leaves_its_accuracy(fit: WaveformFit, ways: NextRun) -> None:
@@ -100,21 +101,21 @@ def test_a_test_by_definition_leaves_its_accuracy(fit: WaveformFit, ways: NextRu
     assert best.words.startswith("a torsional sidewall test")
     total = fit.covariance[K_V, K_V] + STRUCTURE[K_V] ** 2
     # two independent views of one number: precisions add
-    assert best.half_width == pytest.approx(1.96 / np.sqrt(1.0 / total + 1.0 / SIDEWALL**2))
+    assert best.half_width[K_V] == pytest.approx(1.96 / np.sqrt(1.0 / total + 1.0 / SIDEWALL**2))
     tread = ways.best(K_T)
     assert tread is not None
     assert tread.words.startswith("a press test of the tread alone")
-    assert tread.half_width == pytest.approx(1.96 * TREAD, rel=0.05)
+    assert tread.half_width[K_T] == pytest.approx(1.96 * TREAD, rel=0.05)
 
 
 def test_a_press_test_tells_the_fit_and_not_its_structure(ways: NextRun) -> None:
-    for k in range(len(BARE)):
-        press = next(r for r in ways.tests[k] if r.words.startswith("a press test (vertical"))
-        assert 1.96 * STRUCTURE[k] <= press.half_width <= ways.half_width[k] * (1.0 + 1e-9)
+    press = next(test for test in ways.tests if test.words.startswith("a press test (vertical"))
+    assert (press.half_width >= 1.96 * STRUCTURE).all()
+    assert (press.half_width <= ways.half_width * (1.0 + 1e-9)).all()
 
 
 def test_nothing_is_advised_where_nothing_helps(ways: NextRun) -> None:
-    one = replace(ways, runs=((),) * 8, tests=((),) * 8)
+    one = replace(ways, runs=(), tests=())
     assert one.best(0) is None
     assert one.best_run(0) is None
 
@@ -124,7 +125,7 @@ def test_a_run_beyond_the_tire_is_left_out(
 ) -> None:
     monkeypatch.setattr(module, "ABOVE", 8.0)
     fewer = next_run(fit, STRUCTURE)
-    assert 0 < len(fewer.runs[0]) < len(ways.runs[0])
+    assert 0 < len(fewer.runs) < len(ways.runs)
 
 
 def test_laboratory_tests_measure_what_they_say() -> None:

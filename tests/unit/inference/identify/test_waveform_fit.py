@@ -19,7 +19,7 @@ from tirelib.inference.identify.campaign_data import Data, straight_runs
 from tirelib.inference.identify.delay import STD, UNIT, earlier
 from tirelib.inference.identify.discrepancy import Discrepancy
 from tirelib.inference.identify.identify import prior_std, start_file
-from tirelib.inference.identify.waveform_fit import WaveformFit, fit_waveforms
+from tirelib.inference.identify.waveform_fit import WaveformFit, fit_waveforms, ridges
 from tirelib.inference.identify.waveform_problem import MISFIT, WaveformProblem, WaveformSolved
 from tirelib.inference.identify.whiten_runs import RunWhitening
 from tirelib.inference.statistics import posterior
@@ -211,11 +211,12 @@ def profile(fit: WaveformFit, k: int, offset: float) -> float:
 
 def test_intervals_along_the_ridge_are_those_of_the_profile(fitted: WaveformFit) -> None:
     """A true profile likelihood of one parameter rises by 1.96 squared at the interval's ends."""
+    interval, quadratic = ridges(fitted)
     for k in (3, 5):  # the widest, k_v, and the tread
-        for end in fitted.interval[k]:
+        for end in interval[k]:
             rise = profile(fitted, k, float(end))
             assert rise == pytest.approx(1.96**2, rel=0.1)
-    assert fitted.quadratic.all()
+    assert quadratic.all()
 
 
 def test_the_solution_is_where_the_gradient_vanishes(fitted: WaveformFit) -> None:

@@ -22,8 +22,9 @@ from tirelib.core.parameters import Number, TireFile, write_tire
 from tirelib.core.parameters.tir import read_tir
 from tirelib.inference.compare.force_model import force_model_of
 from tirelib.inference.compare.magic_points import model_points
+from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.magic.file import magic_tire
-from tirelib.inference.magic.fit import STAGES, MagicFit, MagicPoints, _Fit, fit_magic
+from tirelib.inference.magic.fit import STAGES, MagicFit, _Fit, fit_magic
 from tirelib.physics.brush.mf import magic_forces
 from tirelib.physics.brush.mf_tire import Coefficients, MagicTire
 
@@ -37,7 +38,7 @@ SLIPS = np.array([0.01, 0.03, 0.06, 0.1, 0.15, 0.2])
 BOTH = np.concatenate([-SLIPS[::-1], [0.0], SLIPS])
 
 
-def made(slips: np.ndarray = BOTH, loads: tuple[float, ...] = LOADS) -> MagicPoints:
+def made(slips: np.ndarray = BOTH, loads: tuple[float, ...] = LOADS) -> ForceData:
     """Points of a tire of the formula itself."""
     pairs = [(a, 0.0) for a in slips] + [(0.0, k) for k in slips]
     pairs += list(product(slips[::3], slips[::3]))
@@ -46,7 +47,7 @@ def made(slips: np.ndarray = BOTH, loads: tuple[float, ...] = LOADS) -> MagicPoi
     alpha, kappa = pair.T
     tire = MagicTire(61, Coefficients(TRUTH), 0.32, 4000.0, 2.2e5, 2.2e5, {})
     at = magic_forces(tire, load, alpha, kappa, camber, pressure)
-    return MagicPoints(load, alpha, kappa, camber, pressure, at.Fx, at.Fy, at.Mz)
+    return ForceData(load, pressure, alpha, kappa, camber, Fx=at.Fx, Fy=at.Fy, Mz=at.Mz)
 
 
 @cache
@@ -69,7 +70,7 @@ def test_a_coefficient_is_fitted_as_its_values_at_the_ends_of_the_loads() -> Non
     """So E <= 1 and a friction above zero hold at every load between them."""
     points, (low, high) = made(), (LOADS[0] / 4000.0 - 1.0, LOADS[-1] / 4000.0 - 1.0)
     for stage in STAGES[:5]:
-        fit = _Fit(points, stage, np.ones(points.load.size, dtype=bool), (low, high))
+        fit = _Fit(points, stage, (low, high))
         random = np.random.default_rng(1).uniform(0.1, 0.9, fit.size)
         ends: dict[str, float] = {}
         fit._put(random, ends)
@@ -88,9 +89,8 @@ def test_a_coefficient_is_fitted_as_its_values_at_the_ends_of_the_loads() -> Non
 def test_what_does_not_vary_is_not_fitted_and_what_is_missing_is_named() -> None:
     points = made()
     chosen = (points.load == LOADS[1]) & (points.pressure == 2.2e5) & (points.camber == 0.0)
-    fields = {name: getattr(points, name)[chosen] for name in MagicPoints.__slots__}
     none = np.full(int(chosen.sum()), np.nan)
-    fit = fit_magic(MagicPoints(**fields | {"Fx": none, "Mz": none}), radius=0.32)
+    fit = fit_magic(replace(points.take(chosen), Fx=none, Mz=none), radius=0.32)
     assert set(fit.fitted) == {
         *("PCY1", "PDY1", "PEY1", "PKY1", "PHY1", "PVY1"),
         *("RBY1", "RBY2", "RBY3", "RCY1", "REY1", "RHY1"),
@@ -103,9 +103,8 @@ def test_what_does_not_vary_is_not_fitted_and_what_is_missing_is_named() -> None
 
 def test_too_few_points_are_refused() -> None:
     points = made()
-    few = MagicPoints(**{name: getattr(points, name)[:9] for name in MagicPoints.__slots__})
     with pytest.raises(CalibrationError, match=r"9 points with Fy .* are needed"):
-        fit_magic(few, radius=0.32)
+        fit_magic(points.take(np.arange(9)), radius=0.32)
 
 
 def brush(**more: float) -> TireFile:

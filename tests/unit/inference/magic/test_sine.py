@@ -51,20 +51,6 @@ def test_curve_that_stops_early_does_not_tell_the_peak() -> None:
     assert fit.stiffness == pytest.approx(9e4, abs=5 * fit.stiffness_std)
 
 
-def test_held_coefficients_stay_and_carry_no_variance() -> None:
-    alpha = np.linspace(-0.25, 0.25, 41)
-    fit = fit_sine(alpha, lateral_curve(alpha, TRUE), held={"S_h": 0.002, "S_v": -40.0})
-    assert fit.coefficients["S_h"] == 0.002
-    assert np.all(fit.covariance[4:] == 0.0)
-
-
-def test_given_noise_sets_the_deviation() -> None:
-    alpha = np.linspace(-0.25, 0.25, 41)
-    force = lateral_curve(alpha, TRUE)
-    one, ten = (fit_sine(alpha, force, Fy_std=s).peak_std for s in (1.0, 10.0))
-    assert ten == pytest.approx(10.0 * one, rel=1e-6)
-
-
 def test_bad_data_are_refused() -> None:
     alpha = np.linspace(-0.2, 0.2, 21)
     force = lateral_curve(alpha, TRUE)
@@ -74,9 +60,5 @@ def test_bad_data_are_refused() -> None:
         fit_sine(alpha[:5], force[:5])
     with pytest.raises(ParameterError, match="not finite"):
         fit_sine(alpha, np.where(alpha > 0.1, np.nan, force))
-    with pytest.raises(ParameterError, match="held Q; allowed are C_alpha"):
-        fit_sine(alpha, force, held={"Q": 1.0})
-    with pytest.raises(ParameterError, match=r"C held at 0\.5"):
-        fit_sine(alpha, force, held={"C": 0.5})
     with pytest.raises(ParameterError, match="must be one-dimensional"):
         fit_sine(alpha, force[:3])

@@ -86,7 +86,7 @@ def test_beside_sure_names_what_would_serve_as_well_is_on_trial() -> None:
     document |= {"verdict": "form_inadequate", "named": sets[0], "sets": sets}
     found = suspects_of(document, CATALOGUE)
     assert found.names == tuple(PAIR)
-    assert [effect.name for effect, _ in found.beside] == ["carcass"]
+    assert found.beside == ("carcass",)
 
 
 def test_the_advised_point_is_the_first_pressure_once_more_at_the_end() -> None:

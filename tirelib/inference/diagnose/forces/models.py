@@ -87,7 +87,7 @@ class ForceFit:
     def value_std(self, name: str) -> float:
         """Return the standard deviation of a fitted parameter, SI."""
         at = self.problem.names.index(name)
-        unit = self.values[name] if SPECS[name].log else SPECS[name].size
+        unit = SPECS[name].slope(self.values[name])
         return float(abs(unit) * np.sqrt(self.covariance[at, at]))
 
 
