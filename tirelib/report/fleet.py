@@ -117,8 +117,10 @@ def fleet_parts(document: Mapping[str, Any]) -> list[Part]:
 
 
 def _part(title: str, anchor: str, text: str, table: Table, plots: Sequence[Plot] = ()) -> Part:
-    """Return a part; a table without rows is left out, one with many is cut off."""
+    """Return a part; a table without rows is left out, one with many is cut off and says so."""
     cut = replace(table, rows=table.rows[:MOST_ROWS])
+    if len(table.rows) > MOST_ROWS:
+        text = f"{text} The first {MOST_ROWS} of {len(table.rows)} rows.".strip()
     return Part(title, anchor, text, [cut] if table.rows else [], plots)
 
 

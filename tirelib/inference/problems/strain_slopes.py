@@ -58,14 +58,7 @@ def _with_changes(
 
 def changes_at(point: Point) -> Changes:
     """Return what a point's effects change."""
-    return [
-        effect.at(_numbers(s)) for effect, s in zip(point.effects, point.strengths, strict=True)
-    ]
-
-
-def _numbers(strength: FloatArray) -> float | tuple[float, ...]:
-    """Return a strength as effects take it."""
-    return float(strength[0]) if strength.size == 1 else tuple(strength.tolist())
+    return [effect.at(s) for effect, s in zip(point.effects, point.strengths, strict=True)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,7 +137,7 @@ class StrainSlopes:
                 scales.append(effect.scale)
                 strength = point.strengths[k].copy()
                 strength[j] += steps[-1]
-                there.append((k, effect.at(_numbers(strength))))
+                there.append((k, effect.at(strength)))
         rows = np.zeros((0, *solved.waveform.shape))
         if there:
             rows = by_effects(solved.model, there, steps).waveform
