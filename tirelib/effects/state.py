@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tirelib.core.arrays import FloatArray
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import ParameterError
 from tirelib.core.parameters import offset_at
 from tirelib.physics.contact.free_boundary import Start
@@ -61,6 +61,13 @@ class Operating:
     def take(self, index: Any) -> "Operating":
         """Return some of the points."""
         return Operating(*[getattr(self, name)[index] for name in self.__slots__])
+
+    def nearest(self, others: "Operating") -> IntArray:
+        """Return which of these points is nearest to each of others, by load and pressure."""
+        load, pressure = (
+            getattr(others, name)[:, None] / getattr(self, name) for name in ("load", "pressure")
+        )
+        return np.asarray(np.argmin(np.log(load) ** 2 + np.log(pressure) ** 2, axis=1))
 
 
 READ = frozenset(
