@@ -18,6 +18,7 @@ from tirelib.model.base import BARE, coordinates, move, predict, values_of
 from tirelib.model.chain import Changes
 from tirelib.model.slopes import SolutionSlopes, added_by_values, by_effects, by_values, slopes_of
 from tirelib.model.solution import Solution, made_with, solved
+from tirelib.physics.rolling.solve import Rolling
 
 VALUES = values_of(TIRE)
 POINTS = operating(np.array([2500.0, 4500.0, 6500.0]), np.array([1.8e5, 2.1e5, 2.4e5]))
@@ -51,8 +52,10 @@ LOW_PASS = LowPass()
 FREE = coordinates(GRIPPING)
 
 
-def at(values: dict[str, float | FloatArray], changes: Changes = ()) -> Solution:
-    return solved(values, POINTS, changes, low_pass=LOW_PASS)
+def at(
+    values: dict[str, float | FloatArray], changes: Changes = (), start: Rolling | None = None
+) -> Solution:
+    return solved(values, POINTS, changes, low_pass=LOW_PASS, start=start)
 
 
 @pytest.mark.parametrize(
@@ -151,7 +154,8 @@ def test_what_the_rolling_ring_has_not_is_what_the_linear_one_changes() -> None:
 def test_slopes_are_differences(effects: dict[str, float]) -> None:
     def with_them(z: FloatArray, more: dict[str, float]) -> FloatArray:
         values = move(GRIPPING, z, FREE)
-        return at(values, [CATALOGUE[name].at(s) for name, s in more.items()]).waveform
+        changes = [CATALOGUE[name].at(s) for name, s in more.items()]
+        return at(values, changes, found.rolling).waveform
 
     zero = np.zeros(len(FREE))
     found = at(GRIPPING, [CATALOGUE[name].at(s) for name, s in effects.items()])
