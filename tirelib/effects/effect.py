@@ -3,7 +3,9 @@
 import re
 import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from operator import attrgetter
 from typing import Any, TypeVar
 
 import numpy as np
@@ -234,8 +236,9 @@ def _faults(before: S, after: S) -> list[str]:
     if not is_dataclass(after):
         return []
     found = []
-    for name in after.__dataclass_fields__:
-        old, new = getattr(before, name), getattr(after, name)
+    kind: Any = type(after)
+    names, held = _held(kind)
+    for name, old, new in zip(names, held(before), held(after), strict=True):
         if new is old or not isinstance(old, np.ndarray):
             continue
         if np.shape(new) != old.shape:
@@ -248,6 +251,13 @@ def _faults(before: S, after: S) -> list[str]:
         elif np.iscomplexobj(new) and not np.iscomplexobj(old):
             found.append(f"{name} is complex; real numbers are needed")
     return found
+
+
+@cache
+def _held(kind: Any) -> tuple[tuple[str, ...], Callable[[object], tuple[Any, ...]]]:
+    """Return the fields of a kind of state, and what gets them all at once."""
+    names = tuple(field.name for field in fields(kind))
+    return names, attrgetter(*names)
 
 
 def _known_unit(unit: str) -> bool:
