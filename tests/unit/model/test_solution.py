@@ -141,6 +141,18 @@ def test_what_the_rolling_ring_has_not_is_what_the_linear_one_changes() -> None:
     assert np.abs(linear - plain).max() > 1e-6
 
 
+def test_effects_at_the_gage_find_the_deflection_of_the_solution() -> None:
+    def deeper(state: State) -> State:
+        return state.but(waveform=state.waveform * (1.0 + 10.0 * state.deflection[:, None]))
+
+    plain, found = at(GRIPPING), at(GRIPPING, [("gage", deeper)])
+    growth = 1.0 + 10.0 * plain.deflection[:, None]
+    np.testing.assert_allclose(found.waveform, plain.waveform * growth, rtol=1e-12)
+    # the deflection is held: a difference over a step of the waveform
+    slopes, before = (by_values(one, FREE[:1]).waveform for one in (found, plain))
+    np.testing.assert_allclose(slopes, before * growth, atol=1e-9 * np.abs(before).max())
+
+
 @pytest.mark.parametrize(
     "effects",
     [
