@@ -1,8 +1,13 @@
 """What is known of the conditions of a piece of a recording, from its first sample on."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 
-from tirebench.recording.segments import Segment
+from tests.bench.sources import serial, told, vehicle, wire
+from tirebench.links import Read
+from tirebench.recording.segments import Segment, segments
 from tirebench.wire.conditions import QUANTITIES, Conditions, condition
 from tirebench.wire.timeline import Samples
 
@@ -33,3 +38,23 @@ def test_what_a_bus_says_after_a_piece_is_not_of_it() -> None:
     found = piece([(2_100_000, "speed", 15.0)]).known(Conditions.constant(speed=10.0))
     assert found.t_us == (2_000_000,)
     assert found.values[0][NAMES.index("speed")] == 10.0
+
+
+def test_what_a_bus_said_holds_in_every_later_segment_until_it_says_something_else() -> None:
+    frames = wire()
+    late = 5 * len(frames) // 6  # in the last of three runs
+    says = {0: told(36.0), late: told(72.0)}
+    reads = []
+    for place, frame in enumerate(frames):
+        if place in says:
+            reads.append(Read(place, says[place], "", 1))
+        reads.append(Read(place, frame))
+    recording: Any = SimpleNamespace(reads=lambda: iter(reads))
+    found = list(segments(recording, [serial("a", wheel=3), vehicle("b")]))
+    known = [segment.known(Conditions.constant(speed=1.0)).values for segment in found]
+    speeds, pressures = (
+        [[row[NAMES.index(name)] for row in values] for values in known]
+        for name in ("speed", "pressure")
+    )
+    assert speeds == [[10.0], [10.0], [10.0, 20.0]]
+    np.testing.assert_allclose([row[0] for row in pressures], 2.5e5)

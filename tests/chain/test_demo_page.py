@@ -1,18 +1,23 @@
 """The demonstration from ready campaigns: every step runs, and the page holds what they give."""
 
 import importlib.util
+import io
 import json
 import re
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
+from contextlib import redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
 from rich.console import Console
 
+from tests.chain.test_command_line import run
 from tests.synthetic import cornering_runs, synthetic_run, write
 
 ROOT = Path(__file__).parents[2]
@@ -47,10 +52,42 @@ def campaigns(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def made(campaigns: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    out = tmp_path_factory.mktemp("demo")
-    done = demo("--data", campaigns, "--out", out)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return out, done.stdout
+    out, module, said = tmp_path_factory.mktemp("demo"), demo_module(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(said):
+        patch.setattr(sys, "argv", ["demo.py", "--data", str(campaigns), "--out", str(out)])
+        patch.setattr(module.Steps, "together", one_by_one)
+        patch.setattr(subprocess, "run", in_this_process)
+        try:
+            module.main()
+        except SystemExit as end:
+            raise AssertionError(said.getvalue()) from end
+    return out, said.getvalue()
+
+
+def one_by_one(steps: Any, jobs: Sequence[Any]) -> None:
+    """Run commands that do not need each other as those that do."""
+    for job in jobs:
+        steps.run(job.what, *job.words, program=job.program)
+
+
+IN_ITS_OWN = subprocess.run
+
+
+def in_this_process(
+    command: Sequence[str], *, cwd: Path, env: Mapping[str, str], check: bool
+) -> "subprocess.CompletedProcess[Any]":
+    """Run `tirelib` without a process of its own, whose imports take seconds.
+
+    The figures of its reports, which tests/unit/report looks at, are not drawn again.
+    """
+    if Path(command[0]).name != "tirelib":
+        return IN_ITS_OWN(command, cwd=cwd, env=env, check=check)
+    with pytest.MonkeyPatch.context() as patch:
+        for page in ("calibration", "estimate"):
+            patch.setattr(f"tirelib.report.{page}.draw_all", lambda folder, drawings: [])
+        done = run(*command[1:])
+    sys.stdout.write(done.stdout + done.stderr)
+    return done
 
 
 def test_the_demonstration_ends_by_naming_files_that_exist(made: tuple[Path, str]) -> None:
@@ -163,6 +200,20 @@ def test_a_difference_makes_the_demonstration_fail(
             judge(Console(), replace(files, **{name: changed}), data)
         assert end.value.code == 1
         assert "NOT EQUAL" in capsys.readouterr().out
+
+
+def test_commands_run_side_by_side_on_one_core_each_and_say_what_they_said() -> None:
+    module, said = demo_module(), io.StringIO()
+    module.PROGRAMS = Path("/bin")
+    steps = module.Steps(Console(file=said, width=200))
+    steps.together([module.Job("Say", ("a word",), "echo"), module.Job("Show", (), "env")])
+    assert "a word" in said.getvalue().splitlines()
+    assert "OMP_NUM_THREADS=1" in said.getvalue().splitlines()
+    assert sorted(steps.commands) == [("Say", "echo 'a word'"), ("Show", "env")]
+    with pytest.raises(SystemExit) as end:
+        steps.together([module.Job("Fail", (), "false")])
+    assert end.value.code == 1
+    assert "false ended with exit code 1" in said.getvalue()
 
 
 def test_nothing_is_left_running_when_a_step_fails(tmp_path: Path) -> None:

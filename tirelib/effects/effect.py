@@ -4,6 +4,8 @@ import re
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from operator import attrgetter
 from typing import Any, TypeVar
 
 import numpy as np
@@ -237,20 +239,28 @@ def _faults(before: S, after: S) -> list[str]:
     if not is_dataclass(after):
         return []
     found = []
-    for field in fields(after):
-        old, new = getattr(before, field.name), getattr(after, field.name)
+    kind: Any = type(after)
+    names, held = _held(kind)
+    for name, old, new in zip(names, held(before), held(after), strict=True):
         if new is old or not isinstance(old, np.ndarray):
             continue
         if np.shape(new) != old.shape:
-            found.append(f"{field.name} has shape {np.shape(new)}; {old.shape} is needed")
+            found.append(f"{name} has shape {np.shape(new)}; {old.shape} is needed")
         elif np.asarray(new).dtype.kind not in "fc":
-            found.append(f"{field.name} holds {np.asarray(new).dtype}; real numbers are needed")
-        elif (np.isnan(new) & ~np.isnan(old)).any():
-            point = int(np.argwhere(np.isnan(new))[0][0])
-            found.append(f"{field.name} is not a number (NaN) at point {point}")
+            found.append(f"{name} holds {np.asarray(new).dtype}; real numbers are needed")
+        elif (none := np.isnan(new)).any() and (none & ~np.isnan(old)).any():
+            point = int(np.argwhere(none)[0][0])
+            found.append(f"{name} is not a number (NaN) at point {point}")
         elif np.iscomplexobj(new) and not np.iscomplexobj(old):
-            found.append(f"{field.name} is complex; real numbers are needed")
+            found.append(f"{name} is complex; real numbers are needed")
     return found
+
+
+@cache
+def _held(kind: Any) -> tuple[tuple[str, ...], Callable[[object], tuple[Any, ...]]]:
+    """Return the fields of a kind of state, and what gets them all at once."""
+    names = tuple(field.name for field in fields(kind))
+    return names, attrgetter(*names)
 
 
 def _known_unit(unit: str) -> bool:

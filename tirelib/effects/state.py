@@ -5,12 +5,13 @@ its argument. All arrays have one row per operating point, SI, ISO signs.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
-from tirelib.core.arrays import FloatArray
+from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.errors import ParameterError
 from tirelib.core.parameters import offset_at
 from tirelib.physics.contact.free_boundary import Start
@@ -61,6 +62,13 @@ class Operating:
     def take(self, index: Any) -> "Operating":
         """Return some of the points."""
         return Operating(*[getattr(self, name)[index] for name in self.__slots__])
+
+    def nearest(self, others: "Operating") -> IntArray:
+        """Return which of these points is nearest to each of others, by load and pressure."""
+        load, pressure = (
+            getattr(others, name)[:, None] / getattr(self, name) for name in ("load", "pressure")
+        )
+        return np.asarray(np.argmin(np.log(load) ** 2 + np.log(pressure) ** 2, axis=1))
 
 
 READ = frozenset(
@@ -149,7 +157,9 @@ class State:
         n = len(conditions)
 
         def column(name: str) -> FloatArray:
-            return np.broadcast_to(np.asarray(values[name], dtype=float), (n,))
+            out = np.full(n, values[name], dtype=float)
+            out.setflags(write=False)  # no law changes its argument
+            return out
 
         above = conditions.pressure - column("pressure")
         state = cls(
@@ -187,7 +197,12 @@ class State:
 
     def but(self, **changes: Any) -> "State":
         """Return the state with some fields replaced."""
-        return replace(self, **changes)
+        held = [*_HELD(self)]
+        for name, value in changes.items():
+            if name not in _PLACE:
+                raise TypeError(f"a state has no field {name!r}; it has {', '.join(_PLACE)}")
+            held[_PLACE[name]] = value
+        return State(*held)
 
     @property
     def wave(self) -> FloatArray:
@@ -243,6 +258,8 @@ class State:
         return Tread(self.free_radius, self.k_t, self.thickness, self.hardening)
 
 
+_PLACE = {field.name: place for place, field in enumerate(fields(State))}
+_HELD = attrgetter(*_PLACE)
 CONSTANTS = tuple(
     field.name
     for field in fields(State)

@@ -14,6 +14,7 @@ from tirelib.model.rolled import CONSTANT_STEP, RolledSlopes, rolled_slopes
 from tirelib.model.solution import (
     Solution,
     Values,
+    at_gage,
     beside,
     kinds_of,
     made_with,
@@ -150,14 +151,15 @@ def by_effects(
     kinds, kinds_there = kinds_of(v, p, changes), kinds_of(v, p, [new for _, new in there])
     own, linear = parts(changes, kinds)
     shown = np.zeros((len(there), *found.shown.shape))
-    at_gage = np.zeros_like(shown)
+    gaged, state = np.zeros_like(shown), at_gage(found)
     rolled: list[int] = []
     moved: list[tuple[Values, Operating, Sequence[Change]]] = []
     ring: tuple[State, FloatArray, State, Course] | None = None
     for k, ((place, new), kind, step) in enumerate(zip(there, kinds_there, steps, strict=True)):
         every = [*changes[:place], new, *changes[place + 1 :]]
         if kind == "gage":
-            at_gage[k] = (shown_at_gage(found, found.shown, every) - found.waveform) / step
+            moved_there = shown_at_gage(found, found.shown, every, state)
+            gaged[k] = (moved_there - found.waveform) / step
             continue
         own_there, linear_there = parts(every, [*kinds[:place], kind, *kinds[place + 1 :]])
         if kind == "rolling" and len(linear_there) == len(linear):
@@ -178,7 +180,7 @@ def by_effects(
     by = None
     if rolled:
         shown[rolled], by = _towards(found, moved, [steps[k] for k in rolled], own)
-    rows = _through_gage(found, shown) + at_gage
+    rows = _through_gage(found, shown) + gaged
     return SolutionSlopes(rows, by)
 
 
@@ -214,11 +216,11 @@ def _through_gage(found: Solution, rows: FloatArray) -> FloatArray:
     """Return small changes (k, n_points, n_phi) of the waveform as the gage shows them."""
     if not any(stage == "gage" for stage, _ in found.changes):
         return rows
-    size = GAGE_STEP * float(np.abs(found.shown).max())
+    size, state = GAGE_STEP * float(np.abs(found.shown).max()), at_gage(found)
     out = []
     for row in rows:
         step = size / max(float(np.abs(row).max()), 1e-300)
-        moved = shown_at_gage(found, found.shown + step * row, found.changes)
+        moved = shown_at_gage(found, found.shown + step * row, found.changes, state)
         out.append((moved - found.waveform) / step)
     return np.stack(out)
 

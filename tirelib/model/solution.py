@@ -193,12 +193,23 @@ def pressed_ring(
     return pressed(State.of(values, points, plain.phi), every)
 
 
-def shown_at_gage(found: Solution, shown: FloatArray, changes: Changes) -> FloatArray:
-    """Return a waveform (n_points, n_phi) after the effects at the gage."""
+def shown_at_gage(
+    found: Solution, shown: FloatArray, changes: Changes, state: State | None = None
+) -> FloatArray:
+    """Return a waveform (n_points, n_phi) after the effects at the gage.
+
+    `state` is that of `at_gage`, where many waveforms are shown.
+    """
     if not any(stage == "gage" for stage, _ in changes):
         return shown
+    state = at_gage(found) if state is None else state
+    return apply(state.but(waveform=shown), changes, "gage").wave
+
+
+def at_gage(found: Solution) -> State:
+    """Return the state that effects at the gage find, without a waveform."""
     state = State.of(found.values, found.points, found.phi)
-    return apply(state.but(deflection=found.deflection, waveform=shown), changes, "gage").wave
+    return state.but(deflection=found.deflection)
 
 
 def _followed(

@@ -1,5 +1,6 @@
 """The type of an effect: what it refuses, and how its law is guarded."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,16 @@ def softer(state: State, strength: float) -> State:
 
 def run(change: Any, points: Any = POINTS) -> State:
     return predict(values_of(TIRE), points, [change])
+
+
+def test_the_nearest_of_points_is_nearest_by_ratios_of_load_and_pressure() -> None:
+    every = np.arange(len(POINTS))
+    np.testing.assert_array_equal(POINTS.nearest(POINTS), every)
+    moved = replace(POINTS, load=1.1 * POINTS.load, pressure=0.95 * POINTS.pressure)
+    np.testing.assert_array_equal(POINTS.nearest(moved), every)
+    few = replace(POINTS, load=np.array([1e3, 3e3, 3e3]), pressure=np.array([2e5, 1e5, 2.4e5]))
+    asked = replace(POINTS, load=np.array([1.8e3, 1.7e3, 2.9e3]), pressure=np.full(3, 2.2e5))
+    np.testing.assert_array_equal(few.nearest(asked), [2, 0, 2])
 
 
 @pytest.mark.parametrize(

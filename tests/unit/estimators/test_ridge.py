@@ -1,11 +1,10 @@
 """The ridge regression of many parts is the library's, part by part."""
 
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.linear_model import BayesianRidge
 
 from tirelib.estimators.ridge import LEAST_CHANGE, MOST_STEPS, ridge_fit, ridge_fits
 
@@ -19,8 +18,12 @@ def data(seed: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return x, y, rng.uniform(0.2, 2.0, N)
 
 
-def library(x: np.ndarray, y: np.ndarray, weights: np.ndarray, centre: bool) -> BayesianRidge:
+def library(x: np.ndarray, y: np.ndarray, weights: np.ndarray, centre: bool) -> Any:
     """Fit with scikit-learn what is standardised by hand."""
+    # slow to import: not where a process only collects these tests
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.linear_model import BayesianRidge
+
     middle = np.average(y, weights=weights) if centre else 0.0
     spread = np.sqrt(np.average((y - middle) ** 2, weights=weights))
     ridge = BayesianRidge(fit_intercept=False, max_iter=MOST_STEPS, tol=LEAST_CHANGE)

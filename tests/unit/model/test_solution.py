@@ -18,6 +18,7 @@ from tirelib.model.base import BARE, coordinates, move, predict, values_of
 from tirelib.model.chain import Changes
 from tirelib.model.slopes import SolutionSlopes, added_by_values, by_effects, by_values, slopes_of
 from tirelib.model.solution import Solution, made_with, solved
+from tirelib.physics.rolling.solve import Rolling
 
 VALUES = values_of(TIRE)
 POINTS = operating(np.array([2500.0, 4500.0, 6500.0]), np.array([1.8e5, 2.1e5, 2.4e5]))
@@ -51,8 +52,10 @@ LOW_PASS = LowPass()
 FREE = coordinates(GRIPPING)
 
 
-def at(values: dict[str, float | FloatArray], changes: Changes = ()) -> Solution:
-    return solved(values, POINTS, changes, low_pass=LOW_PASS)
+def at(
+    values: dict[str, float | FloatArray], changes: Changes = (), start: Rolling | None = None
+) -> Solution:
+    return solved(values, POINTS, changes, low_pass=LOW_PASS, start=start)
 
 
 @pytest.mark.parametrize(
@@ -138,6 +141,18 @@ def test_what_the_rolling_ring_has_not_is_what_the_linear_one_changes() -> None:
     assert np.abs(linear - plain).max() > 1e-6
 
 
+def test_effects_at_the_gage_find_the_deflection_of_the_solution() -> None:
+    def deeper(state: State) -> State:
+        return state.but(waveform=state.waveform * (1.0 + 10.0 * state.deflection[:, None]))
+
+    plain, found = at(GRIPPING), at(GRIPPING, [("gage", deeper)])
+    growth = 1.0 + 10.0 * plain.deflection[:, None]
+    np.testing.assert_allclose(found.waveform, plain.waveform * growth, rtol=1e-12)
+    # the deflection is held: a difference over a step of the waveform
+    slopes, before = (by_values(one, FREE[:1]).waveform for one in (found, plain))
+    np.testing.assert_allclose(slopes, before * growth, atol=1e-9 * np.abs(before).max())
+
+
 @pytest.mark.parametrize(
     "effects",
     [
@@ -151,7 +166,8 @@ def test_what_the_rolling_ring_has_not_is_what_the_linear_one_changes() -> None:
 def test_slopes_are_differences(effects: dict[str, float]) -> None:
     def with_them(z: FloatArray, more: dict[str, float]) -> FloatArray:
         values = move(GRIPPING, z, FREE)
-        return at(values, [CATALOGUE[name].at(s) for name, s in more.items()]).waveform
+        changes = [CATALOGUE[name].at(s) for name, s in more.items()]
+        return at(values, changes, found.rolling).waveform
 
     zero = np.zeros(len(FREE))
     found = at(GRIPPING, [CATALOGUE[name].at(s) for name, s in effects.items()])

@@ -187,8 +187,9 @@ def _run(points: Operating, which: Sequence[int]) -> str:
 def _solved(fit: WaveformFit, points: Operating) -> tuple[Solution, SolutionSlopes] | None:
     """Return the fitted model at points; None where it has no solution."""
     low_pass = fit.problem.data.low_pass
+    start = fit.model.rolling.take(fit.problem.data.points.nearest(points))
     try:
-        model = solved(fit.values, points, low_pass=low_pass)
+        model = solved(fit.values, points, low_pass=low_pass, start=start)
         return model, slopes_of(model, fit.free)
     except TirelibError:
         return None

@@ -185,7 +185,9 @@ class StrainProblem:
         out._scale = np.concatenate([self._scale, ahead])
         out.forget()
         out._whiteners = {}
-        out.reference = out._referred(out._solved(self.reference.point, None))
+        near = np.concatenate([np.arange(len(data.points)), data.points.nearest(points)])
+        start = self.reference.rolling.take(near)
+        out.reference = out._referred(out._solved(self.reference.point, start))
         return out
 
     def part(self, chosen: BoolArray, start: Point) -> "StrainProblem":

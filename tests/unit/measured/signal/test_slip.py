@@ -46,6 +46,10 @@ def test_a_load_that_changes_between_contacts_moves_the_rolling_radius() -> None
     assert unseen_by_load(0.15, 0.2) == unseen_by_load(0.2, 0.15)
 
 
+def test_after_an_unknown_contact_all_of_the_load_s_share_is_unseen() -> None:
+    assert unseen_by_load(0.2, np.nan) == unseen_by_load(0.2, 0.0) > 0.0
+
+
 @given(gain=st.floats(0.2, 5.0), dip=st.floats(2e-4, 2e-3), more=st.floats(0.0, 1e-3))
 def test_the_pull_is_that_of_the_deeper_dip_whatever_the_gain(
     gain: float, dip: float, more: float
@@ -59,6 +63,9 @@ def test_the_pull_is_unknown_where_the_strain_is() -> None:
     assert np.isnan(pull(np.full(PHI.size, np.nan)))
     partly = np.where(PHI > 0.7, np.nan, strained(1e-3, 2e-3))
     assert pull(partly) == pytest.approx(0.25, rel=1e-3)
+    raised = partly + 5e-3  # dips that are no compression any more
+    assert pull(raised) == pytest.approx(1e-3 / 9e-3, rel=1e-3)
+    assert np.isnan(pull(partly - 5e-3)), "without tension there is no contact"
 
 
 @given(slip=st.floats(-0.03, 0.03), half=st.floats(0.05, 0.2), at=st.floats(0.9, 1.1))
@@ -75,6 +82,7 @@ def test_what_the_pull_tells_of_a_slip_is_what_the_turns_have_missed(
 def test_without_a_contact_before_nothing_is_said_of_traction() -> None:
     assert unseen_by_traction((1.0, 0.1), NOTHING, 0.1) == 0.0
     assert unseen_by_traction((1.0, np.nan), (1.0, 0.1), 0.1) == 0.0
+    assert unseen_by_traction((np.inf, 0.1), (1.0, 0.1), 0.1) == 0.0
 
 
 def test_what_a_cubic_cannot_follow_is_more_uncertain_than_noise_of_its_size() -> None:
