@@ -115,20 +115,16 @@ class Hypotheses:
         than without it. Any of n effects may be the further one: a likelihood ratio of n / p in
         favour of one of them has at most the probability p where none is there (Bonferroni, and
         Royall as in `tirelib.inference.statistics.rival`). Something without a name may stand
-        beside either. Where the likeliest further effect is out of its range, or no larger
-        than plain tires show, it is something else that makes the runs likelier, and no effect is
-        there.
+        beside either. Where the likeliest further effect is out of its range, or no larger than
+        plain tires show, it is something else that makes the runs likelier, and no effect is there.
         """
-        larger = [
-            (h.exact_in[k], k, h)
-            for h in self._larger(hypothesis)
-            for k, name in enumerate(h.names)
-            if name not in hypothesis.names
-        ]
-        likelihood, further, rival = max(larger, key=lambda each: each[0], default=(0.0, 0, None))
-        if hypothesis.p <= self.false_alarm or rival is None or not rival.plausible:
+        larger = self._larger(hypothesis)
+        if hypothesis.p <= self.false_alarm or not larger:
             return hypothesis
-        ratio = min(hypothesis.unnamed - likelihood, 0.0)
+        rival, further = max(larger, key=lambda each: each[0].exact_in[each[1]])
+        if not rival.plausible:
+            return hypothesis
+        ratio = min(hypothesis.unnamed - rival.exact_in[further], 0.0)
         p = self._count(hypothesis) * float(np.exp(ratio))
         if max(p, rival.exact_plain[further]) > self.false_alarm:
             return hypothesis
@@ -153,10 +149,11 @@ class Hypotheses:
         """Return of how many effects one may be missing beside a hypothesis."""
         return len(self.effects) - len(self.added(hypothesis))
 
-    def _larger(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        """Return the hypotheses of one effect more that were fitted."""
+    def _larger(self, hypothesis: Hypothesis) -> list[tuple[Hypothesis, int]]:
+        """Return the hypotheses of one effect more that were fitted, and the places of this one."""
         names = set(hypothesis.names)
-        return [h for h in self.tried if len(h.names) == len(names) + 1 and names < set(h.names)]
+        larger = [h for h in self.tried if len(h.names) == len(names) + 1 and names < set(h.names)]
+        return [(h, k) for h in larger for k, name in enumerate(h.names) if name not in names]
 
     def without_plain(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """Return the hypothesis of those of its effects that are larger than plain tires show.
