@@ -66,7 +66,7 @@ def test_the_named_effect_is_added_and_no_longer_a_candidate(
     use(monkeypatch, waves(EFFECT, STRENGTH))
     monkeypatch.setattr("tirelib.model.registration.registered_effects", lambda files: FEW)
     monkeypatch.setattr("tirelib.inference.extend.additions.extended", lambda *_: added()[0])
-    monkeypatch.setattr("tirelib.inference.extend.additions.strain_models", lambda *_: None)
+    monkeypatch.setattr("tirelib.inference.extend.additions.models_of", lambda *_: None)
     second, target = tmp_path / "M2.toml", tmp_path / "A.json"
     found = call(
         "add", EFFECT, "--model", model, "--data", "anywhere", "--out", second, "--json", target
