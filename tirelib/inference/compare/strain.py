@@ -58,12 +58,12 @@ class Comparison:
     run_rms : shape (n_runs,), [-]
         Rms of `difference`.
     rms, measured_rms : float, [-]
-        Of model less measured, set points and delay taken out, and of the measurement; like `p`
-        and `verdict` over the counted runs.
+        Rms of model less measured, with set points and delay taken out, and rms of the measured
+        strain. Like `p` and `verdict`, they are over the counted runs.
     p : float
         Chance of such an error if only noise and set points differ (F test); NaN without repeats.
     verdict : str
-        As of `verdict_of`.
+        What `verdict_of` returns.
     beyond : tuple of str
         Set points that would have to be off by more than `BEYOND` tolerances (rms).
     sentences : tuple of str

@@ -57,7 +57,8 @@ class Step(Generic[F]):
     action : str
         add or remove.
     strength, std : shape (components,)
-        With the effect, in its unit.
+        Strength of the effect and its standard deviation, in the effect's unit, from the model
+        that has the effect.
     floor : float
         Error that structure leaves.
     folds : tuple

@@ -39,7 +39,7 @@ class BrushFit:
     Attributes
     ----------
     problem : BrushProblem
-        With the final scale of each force.
+        The problem that was solved; each force has its final scale in it.
     z : shape (p,)
         Its solution.
     covariance : shape (p, p)

@@ -37,7 +37,7 @@ class RunWhitening:
     ----------
     strain : Whitening
     known : shape (n_runs,)
-        Of which runs the deflection takes part.
+        Whether the deflection of a run is measured and counts.
     gain : shape (n_runs, n_phi), [m]
         What a strain residual tells of the deflection's, through load and pressure.
     inverse : shape (n_known, n_known), [1/m]

@@ -110,13 +110,14 @@ class Hypotheses:
     def against_larger(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a hypothesis that is not rejected with its p-value against one effect more.
 
-        The error that a law may have covers what a further effect does, so that nothing stands out
-        beside it. Where that effect really acts, the runs are likelier with it and its exact law
-        than without it. Any of n effects may be the further one: a likelihood ratio of n / p in
-        favour of one of them has at most the probability p where none is there (Bonferroni, and
-        Royall as in `tirelib.inference.statistics.rival`). Something without a name may stand
-        beside either. Where the likeliest further effect is out of its range, or no larger than
-        plain tires show, it is something else that makes the runs likelier, and no effect is there.
+        The error that a law may have can cover what a further effect does. Then nothing stands out
+        beside the hypothesis. Where the further effect really acts, the runs are likelier with this
+        effect, its law taken as exact, than without it. Any of n effects may be the further one: a
+        likelihood ratio of n / p in favour of one of them has at most the probability p where none
+        is there (Bonferroni, and Royall as in `tirelib.inference.statistics.rival`), with errors of
+        laws of a known size. Something without a name may stand beside either. Where the likeliest
+        further effect is out of its range, or no larger than plain tires show, it is something else
+        that makes the runs likelier, and no effect is there.
         """
         larger = self._larger(hypothesis)
         if hypothesis.p <= self.false_alarm or not larger:

@@ -64,7 +64,7 @@ class Likelihoods:
         exact = self._best(views, self.exact)
         for _ in range(2):
             self._nulls = {self.exact: exact, first: self._best(views, first)}
-            # a run's own misfit hardly depends on whether laws are a bit more or less off
+            # a run's own misfit is smaller where laws may be further off: it is chosen again
             self._view = self._nulls[first][0].view
             self.alike = sorted(map(self._same, LAWS), key=self.of, reverse=True)
             if self.alike[0] == first:
