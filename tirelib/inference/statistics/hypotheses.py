@@ -123,11 +123,8 @@ class Hypotheses:
         if hypothesis.p <= self.false_alarm or not larger:
             return hypothesis
         rival, further = max(larger, key=lambda each: each[0].exact_in[each[1]])
-        if not rival.plausible:
-            return hypothesis
-        ratio = min(hypothesis.unnamed - rival.exact_in[further], 0.0)
-        p = self._count(hypothesis) * float(np.exp(ratio))
-        if max(p, rival.exact_plain[further]) > self.false_alarm:
+        p = self._p_beside(hypothesis, rival, further)
+        if not rival.plausible or max(p, rival.exact_plain[further]) > self.false_alarm:
             return hypothesis
         out = replace(hypothesis, rival=" and ".join(self.added(rival)), p_rival=p)
         self._made[frozenset(self.added(hypothesis))] = out
@@ -146,6 +143,11 @@ class Hypotheses:
         behind = hypothesis.likelihood - hypothesis.exact, 0.0
         return any(KINKED * gain >= odds + less for gain, less in zip(gains, behind, strict=True))
 
+    def _p_beside(self, hypothesis: Hypothesis, larger: Hypothesis, further: int) -> float:
+        """Return the p-value of a hypothesis against one effect more, as in `against_larger`."""
+        ratio = min(hypothesis.unnamed - larger.exact_in[further], 0.0)
+        return self._count(hypothesis) * float(np.exp(ratio))
+
     def _count(self, hypothesis: Hypothesis) -> int:
         """Return of how many effects one may be missing beside a hypothesis."""
         return len(self.effects) - len(self.added(hypothesis))
@@ -159,13 +161,15 @@ class Hypotheses:
     def without_plain(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """Return the hypothesis of those of its effects that are larger than plain tires show.
 
-        It is not rejected where the given one is not. None where no effect is larger.
+        It is not rejected where the given one is not. None where no effect is larger. The error
+        that its law may have can hide how large an effect is. An effect stays as well where it is
+        larger with an exact law, and the hypothesis without it would be rejected for it.
         """
         had = len(self.had)
         larger = [
             name
             for k, name in enumerate(self.added(hypothesis), had)
-            if hypothesis.p_plain(k) <= self.false_alarm
+            if hypothesis.p_plain(k) <= self.false_alarm or self._missed(hypothesis, k)
         ]
         if not larger or tuple(larger) == self.added(hypothesis):
             return hypothesis if larger else None
@@ -177,6 +181,14 @@ class Hypotheses:
         out = replace(found, p_beside=hypothesis.p)
         self._made[frozenset(larger)] = out
         return out
+
+    def _missed(self, hypothesis: Hypothesis, index: int) -> bool:
+        """Return whether the hypothesis without an effect is rejected for it: `against_larger`."""
+        if hypothesis.exact_plain[index] > self.false_alarm:
+            return False
+        gone = hypothesis.names[index]
+        less = self.at([name for name in self.added(hypothesis) if name != gone])
+        return less is not None and self._p_beside(less, hypothesis, index) <= self.false_alarm
 
     def _alone(self, place: str, names: Sequence[str], near: Hypothesis) -> Hypothesis | None:
         """Return a hypothesis from a fit nearby; None where no fit settles."""

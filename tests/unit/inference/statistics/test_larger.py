@@ -95,6 +95,29 @@ def test_one_effect_more_is_not_there_if_plain_tires_show_as_much_of_it() -> Non
         assert bool(among.against_larger(alone).rival) is gives_way
 
 
+@pytest.mark.parametrize(("p", "stays"), [(0.04, True), (0.06, False)])
+def test_an_effect_stays_without_which_the_hypothesis_would_be_rejected(
+    p: float, stays: bool
+) -> None:
+    among = Hypotheses(planted(3, twist=1.0), FAMILIES)
+    alone, both = among.at(["twist"]), among.at(["twist", "bend"])
+    assert alone is not None
+    assert both is not None
+    further = both.names.index("bend")
+    assert both.p_plain(further) > 0.05
+    assert among.without_plain(both) is not both
+    # two effects may be the further one beside "twist"
+    likely = alone.unnamed + np.log(2 / p)
+    likelier = replace(
+        both,
+        exact_in=tuple(likely if k == further else 0.0 for k in range(2)),
+        exact_plain=(0.0, 0.0),
+    )
+    assert (among.without_plain(likelier) is likelier) is stays
+    shown = replace(likelier, exact_plain=(0.06, 0.06))
+    assert among.without_plain(shown) is not shown
+
+
 def test_one_effect_more_has_to_be_likelier_than_something_without_a_name() -> None:
     among = Hypotheses(planted(3, twist=1.0, bend=COVERED), FAMILIES)
     alone, both = among.at(["twist"]), among.at(["twist", "bend"])
