@@ -154,12 +154,12 @@ def law_errors(fit: Posterior, errors: Errors, view: View) -> dict[str, float | 
         if law
     }
     if out and errors.lookalike:
-        square, others = _beyond_base(fit, errors.laws, view)
+        square, others = beyond_base(fit, errors.laws, view)
         out |= {name: errors.lookalike**2 * square / other for name, other in others.items()}
     return out
 
 
-def _beyond_base(
+def beyond_base(
     fit: Posterior, laws: Sequence[float], view: View
 ) -> tuple[float, dict[str, float]]:
     """Return the square of what rough laws do that the base cannot take, and of others' rows.
