@@ -39,6 +39,8 @@ from tirelib.physics.rolling.solve import Rolling
 
 OWN = 0.004
 """A run's own misfit over its rms strain, in the contact."""
+BESIDE = 5.0
+"""Half contact angles up to which the belt is bent by the contact; beyond, it is nearly round."""
 UNKNOWN_NOISE = 0.005
 """Noise over the rms strain where there are no repeats."""
 
@@ -288,15 +290,16 @@ class StrainProblem:
         return earlier(rows, self.data.points.omega, -solved.delay)
 
     def remainder(self, point: Point, solved: StrainSolved) -> dict[str, FloatArray]:
-        """Return smooth shapes over the wheel angle, by how they go with a run's conditions."""
+        """Return smooth shapes round the turn, by where they are and what they go with."""
         columns = SHAPES.columns(solved.waveform, self.half_angle, self.data.points, GRID)
         knots = SHAPES.knots
         centre = np.sinh(np.linspace(-np.arcsinh(SHAPES.reach), np.arcsinh(SHAPES.reach), knots))
+        place = np.digitize(np.abs(centre), (INSIDE, BESIDE))
         groups = {}
         for k, name in enumerate(("constant", "load", "pressure", "speed")):
             rows = columns[k * knots : (k + 1) * knots]
-            groups[f"{name}, contact"] = rows[np.abs(centre) < INSIDE]
-            groups[f"{name}, free belt"] = rows[np.abs(centre) >= INSIDE]
+            for j, where in enumerate(("contact", "free belt", "far free belt")):
+                groups[f"{name}, {where}"] = rows[place == j]
         return groups
 
     def roughly(

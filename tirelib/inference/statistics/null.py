@@ -45,11 +45,11 @@ APART = (0.5, 1.0, 2.0)
 the contact, and as much as others on the free belt, the free belt does not stand out."""
 SIZE_STD = 1.5
 """Standard deviation of the logarithm of this size."""
-OWN = tuple(0.0005 * 2.0 ** np.arange(6))
+OWN = tuple(0.00025 * 2.0 ** np.arange(7))
 """Sizes of the misfit that each run has for itself, over its rms strain, among which its likelihood
 chooses."""
 
-FREE = ", free belt"
+FREE = "free belt"
 """End of the name of shapes that stand away from the contact."""
 
 Products = tuple[FloatArray, FloatArray]
