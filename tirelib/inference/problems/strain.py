@@ -298,7 +298,7 @@ class StrainProblem:
         groups = {}
         for k, name in enumerate(("constant", "load", "pressure", "speed")):
             rows = columns[k * knots : (k + 1) * knots]
-            for j, where in enumerate(("contact", "free belt", "far free belt")):
+            for j, where in enumerate(("contact", "free belt", "far belt")):
                 groups[f"{name}, {where}"] = rows[place == j]
         return groups
 

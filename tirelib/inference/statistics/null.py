@@ -49,23 +49,28 @@ OWN = tuple(0.00025 * 2.0 ** np.arange(7))
 """Sizes of the misfit that each run has for itself, over its rms strain, among which its likelihood
 chooses."""
 
-FREE = "free belt"
-"""End of the name of shapes that stand away from the contact."""
+FREE, FAR = ", free belt", ", far belt"
+"""Ends of the names of shapes that stand beside the contact, and far away from it."""
 
 Products = tuple[FloatArray, FloatArray]
 """B r, (m, k), and r' r, (k,), of k residuals r."""
 
 
 class Size(NamedTuple):
-    """How much one tire shows over what its family shows, in general and away from the contact."""
+    """How much one tire shows over what its family shows, in general and beside the contact."""
 
     whole: float
     free: float
 
     def of(self, block: str) -> float:
-        """Return the size of a block: of an effect it is at most `LARGEST`."""
+        """Return the size of a block: of an effect it is at most `LARGEST`.
+
+        What a tire shows far away from the contact says nothing of what it shows elsewhere.
+        """
         if "," not in block:
             return min(self.whole, LARGEST)
+        if block.endswith(FAR):
+            return 1.0
         return self.free if block.endswith(FREE) else self.whole
 
     @property
