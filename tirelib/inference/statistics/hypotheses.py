@@ -218,6 +218,20 @@ class Hypotheses:
         )
         return max(as_good, key=lambda h: h.likelihood, default=None)
 
+    def explains(self, hypothesis: Hypothesis) -> bool:
+        """Return whether each of its effects, with an exact law, makes the runs likelier.
+
+        Compared are the hypotheses without the effect that were fitted. Something without a name
+        may stand beside either. The error that a law may have is flexible: where the runs are no
+        likelier with the exact law than without the effect, the error explains something else.
+        """
+        added = self.added(hypothesis)
+        for k, name in enumerate(added, len(self.had)):
+            less = self._made.get(frozenset(added) - {name})
+            if less is not None and hypothesis.exact_in[k] <= less.unnamed:
+                return False
+        return True
+
     def supported(self, hypothesis: Hypothesis) -> bool:
         """Return whether its laws, taken as exact, explain the runs better than no effect does.
 

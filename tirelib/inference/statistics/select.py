@@ -9,7 +9,8 @@ that is like any one of them is covered. A hypothesis is rejected as well where 
 effects explains the runs much better (`tirelib.inference.statistics.rival`), whether the rival
 itself is rejected or not, or where one effect more makes the runs much likelier
 (`Hypotheses.against_larger`), and gives way to fewer of its effects that explain the runs as well
-(`Hypotheses.simpler`). Every other hypothesis with p > alpha is in the set, without those of its
+(`Hypotheses.simpler`). It counts only if each of its effects explains something
+(`Hypotheses.explains`). Every other hypothesis with p > alpha is in the set, without those of its
 effects that are no larger than plain tires show (`Hypothesis.p_plain`). Its smallest members are
 what the data say (Ferrari and Yang 2015): none in it, nothing is missing; one smallest member, that
 is what is missing; several, they cannot be told apart; none at all, something unknown is there.
@@ -125,7 +126,7 @@ def select(
         every = sorted(
             (h for h in dict.fromkeys(level) if h is not None), key=lambda h: -h.likelihood
         )
-        possible = [h for h in every if h.plausible]
+        possible = [h for h in every if h.plausible and hypotheses.explains(h)]
         # a rival that is itself rejected is not there, but something like it may be
         fitted = [hypotheses.against(h, possible[0]) for h in possible]
         if size < MOST_EFFECTS:
@@ -149,7 +150,7 @@ def select(
             if likeliest is base or not hypotheses.supported(likeliest):
                 return done("unknown", ())
             return done("form_inadequate", [likeliest])
-        leaders = fitted[:LEADERS]
+        leaders = (fitted or [h for h in every if h.plausible])[:LEADERS]
     leader = leaders[0] if leaders else None
     while many and leader is not None and leader.plausible and not np.isfinite(leader.looseness):
         further = _further(leader, hypotheses.effects, 1)

@@ -156,9 +156,9 @@ def _told(verdict: str, *named: str) -> Any:
 
 
 def test_the_next_test_parts_two_that_look_alike_by_what_only_one_varies_with() -> None:
-    step = next_test(_told("indistinguishable", "hydroplaning", "sidewall_damping"))
-    assert step["between"] == ["hydroplaning", "sidewall_damping"]
-    assert "more levels of pressure," in step["what"]
+    step = next_test(_told("indistinguishable", "temperature", "gage_drift"))
+    assert step["between"] == ["temperature", "gage_drift"]
+    assert "more levels of temperature," in step["what"]
     assert step["would_revive"] == {"camber": "no run has a camber"}
 
 

@@ -118,6 +118,32 @@ def test_an_effect_stays_without_which_the_hypothesis_would_be_rejected(
     assert among.without_plain(shown) is not shown
 
 
+@pytest.mark.parametrize("gain", [0.0, 0.1])
+def test_an_effect_counts_only_if_its_exact_law_makes_the_runs_likelier(gain: float) -> None:
+    among = Hypotheses(planted(3, twist=1.0), FAMILIES)
+    alone, both = among.at(["twist"]), among.at(["twist", "bend"])
+    assert alone is not None
+    assert both is not None
+    assert among.explains(alone)
+    # the hypothesis with "bend" alone was not fitted, and "twist" is not weighed
+    likelier = tuple(alone.unnamed + gain if name == "bend" else -np.inf for name in both.names)
+    assert among.explains(replace(both, exact_in=likelier)) is (gain > 0.0)
+    # one effect is weighed against none
+    assert not among.explains(replace(alone, exact_in=(among.base.unnamed,)))
+
+
+def test_what_only_errors_of_laws_explain_is_neither_a_member_nor_a_rival(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    toy = planted(3, twist=1.0)
+    assert select(toy, FAMILIES).sets == (("twist",),)
+    told = Hypotheses.explains
+    monkeypatch.setattr(
+        Hypotheses, "explains", lambda self, h: "twist" not in h.names and told(self, h)
+    )
+    assert not any("twist" in names for names in select(toy, FAMILIES).sets)
+
+
 def test_one_effect_more_has_to_be_likelier_than_something_without_a_name() -> None:
     among = Hypotheses(planted(3, twist=1.0, bend=COVERED), FAMILIES)
     alone, both = among.at(["twist"]), among.at(["twist", "bend"])
