@@ -31,9 +31,10 @@ from tirelib.inference.identify.campaign_data import straight_runs
 from tirelib.inference.problems.strain import StrainProblem
 from tirelib.inference.statistics.law_errors import Errors, beyond_base, law_errors
 from tirelib.inference.statistics.null import OWN, Null
-from tirelib.inference.statistics.plain import BASE, Family, View, load, pooled
+from tirelib.inference.statistics.plain import BASE, Family, load, pooled
 from tirelib.inference.statistics.posterior import Posterior, posterior, sizes_at_start
 from tirelib.inference.statistics.problem import Point
+from tirelib.inference.statistics.views import View
 
 LAW = tuple(0.15 * 2.0 ** np.arange(-3, 4))
 SHARE = (0.0, 0.02, 0.04, 0.075, 0.15, 0.3)

@@ -20,9 +20,10 @@ from tirelib.core.arrays import FloatArray
 from tirelib.inference.statistics.law_errors import LAWS, Errors, Likelihoods, law_errors
 from tirelib.inference.statistics.normal import blocks_of
 from tirelib.inference.statistics.null import OWN, PRIOR, Null, Products
-from tirelib.inference.statistics.plain import Family, View
+from tirelib.inference.statistics.plain import Family
 from tirelib.inference.statistics.posterior import Posterior
 from tirelib.inference.statistics.problem import Problem
+from tirelib.inference.statistics.views import View
 
 USUAL = 0.15
 """Relative standard deviation by which most laws are off."""

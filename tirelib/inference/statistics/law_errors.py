@@ -12,8 +12,9 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.inference.statistics.null import PRIOR, Null, Size
-from tirelib.inference.statistics.plain import BASE, ROUGHLY, Family, View
+from tirelib.inference.statistics.plain import BASE, ROUGHLY, Family
 from tirelib.inference.statistics.posterior import Posterior
+from tirelib.inference.statistics.views import View
 
 LAWS = (0.03, 0.1, 0.3)
 """Relative standard deviations by which laws are off, each law by its own: a hypothesis stays if it
@@ -49,7 +50,7 @@ class Likelihoods:
     fit : Posterior
     families : sequence of Family
     views : sequence of View
-        Normal equations for every size of the misfit that a run has for itself.
+        Normal equations by the size of the misfit that a run has for itself, in order.
 
     Attributes
     ----------
@@ -115,8 +116,17 @@ class Likelihoods:
         return found
 
     def _best(self, views: Sequence[View], errors: Errors) -> tuple[Null, ...]:
-        """Return the tests by every family with the likeliest size of a run's own misfit."""
-        return max((self._at(view, errors) for view in views), key=_largest)
+        """Return the tests by every family with the likeliest size of a run's own misfit.
+
+        Every third size is tried first, and then those next to the best one, as far as it rises.
+        """
+        found = {place: self._at(views[place], errors) for place in range(0, len(views), 3)}
+        best, before = max(found, key=lambda place: _largest(found[place])), None
+        while best != before:
+            near = [place for place in (best - 1, best + 1) if 0 <= place < len(views)]
+            found |= {k: self._at(views[k], errors) for k in near if k not in found}
+            best, before = max((best, *near), key=lambda place: _largest(found[place])), best
+        return found[best]
 
     def _at(self, view: View, errors: Errors) -> tuple[Null, ...]:
         return tuple(null_of(view, self.fit, family, errors) for family in self.families)

@@ -20,9 +20,9 @@ import numpy as np
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.inference.statistics.hypothesis import Hypothesis
 from tirelib.inference.statistics.null import Null
-from tirelib.inference.statistics.plain import View
 from tirelib.inference.statistics.posterior import explaining
 from tirelib.inference.statistics.problem import Problem
+from tirelib.inference.statistics.views import View
 
 DRAWS = 48
 """Measurements drawn for every possible run: the standard deviation of a chance is .07 at most."""

@@ -26,7 +26,8 @@ from scipy import stats
 
 from tirelib.core.arrays import FloatArray
 from tirelib.inference.statistics.normal import Weighed, beside, taken
-from tirelib.inference.statistics.plain import BASE, LARGEST, ROUGHLY, Family, View
+from tirelib.inference.statistics.plain import BASE, LARGEST, ROUGHLY, Family
+from tirelib.inference.statistics.views import View
 
 PRIOR = 0.5
 """Standard deviation of a further effect's strength, in ranges."""

@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.inference.statistics.normal import Normal, Weighed
+from tirelib.inference.statistics.normal import Weighed
+from tirelib.inference.statistics.views import View
 
 ROUNDS = 60
 SETTLED = 0.01
@@ -109,26 +110,6 @@ class Family:
                 out[:, block] = self.draws[:, first : first + rows]
             first += rows
         return np.nan_to_num(out)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class View:
-    """Normal equations of a tire's plan at one size of the misfit that each run has for itself.
-
-    Attributes
-    ----------
-    own : float
-    normal : Normal
-    log_volume : float
-        Logarithm of the whitening's determinant: likelihoods at several sizes compare with it.
-    white : shape (m, n)
-        Whitened rows; empty where only the normal equations are kept.
-    """
-
-    own: float
-    normal: Normal
-    log_volume: float
-    white: FloatArray
 
 
 def learn(

@@ -19,10 +19,11 @@ from tirelib.core.arrays import BoolArray, FloatArray
 from tirelib.core.errors import ConvergenceError
 from tirelib.effects import Effect
 from tirelib.inference.statistics.downhill import FIRST, Whiten, downhill
-from tirelib.inference.statistics.normal import LEAST_VARIANCE, Normal, Weighed, blocks_of
-from tirelib.inference.statistics.plain import BASE, ROUGHLY, View
+from tirelib.inference.statistics.normal import LEAST_VARIANCE, Normal, Weighed
+from tirelib.inference.statistics.plain import BASE, ROUGHLY
 from tirelib.inference.statistics.problem import Model, Point, Problem
 from tirelib.inference.statistics.quadratic import Ends, Quadratic
+from tirelib.inference.statistics.views import Views
 
 MOST_STEPS = 150
 """Steps of a fit at most. Along the edge of a sliding tread one takes 84."""
@@ -145,16 +146,9 @@ class Posterior:
         by |= {effect.name: self.rows[effect.name] for effect in self.point.effects[self.count :]}
         return np.concatenate([self.rows[BASE][:base], *(by[e.name] for e in point.effects)])
 
-    def views(self, problem: Problem, sizes: Sequence[float]) -> list[View]:
+    def views(self, problem: Problem, sizes: Sequence[float]) -> Views:
         """Return the normal equations for sizes of the misfit that each run has for itself."""
-        whitenings = [problem.whitener(own) for own in sizes]
-        every = np.concatenate([*self.rows.values(), self.rest[None]])
-        reduced, out = whitenings[0].reduced(every), []
-        for own, whitening in zip(sizes, whitenings, strict=True):
-            white = whitening.white(reduced)
-            normal = Normal.stacked(blocks_of(self.rows), white[:-1], white[-1])
-            out.append(View(own, normal, whitening.log_volume, white[:-1]))
-        return out
+        return Views(self.rows, self.rest, problem.whitener, sizes)
 
     def std(self, index: int) -> FloatArray:
         """Return standard deviations of an effect's strength, in its unit."""

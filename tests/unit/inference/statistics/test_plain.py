@@ -9,8 +9,9 @@ from tests.unit.inference.statistics.linear_problem import PLAIN, Toy, drawn, fa
 from tirelib.inference.statistics import null
 from tirelib.inference.statistics.hypothesis import judged
 from tirelib.inference.statistics.null import Null
-from tirelib.inference.statistics.plain import View, learn, load, pooled, save
+from tirelib.inference.statistics.plain import learn, load, pooled, save
 from tirelib.inference.statistics.posterior import posterior
+from tirelib.inference.statistics.views import View
 
 COMMON = 0.4
 """What every tire of the family shows of `swell`, in ranges."""
