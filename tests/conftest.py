@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, settings
 
 from tests import once
 from tests.schema_check import wrong_documents
+from tirelib.core import forked
 
 settings.register_profile(
     "same",
@@ -25,6 +26,7 @@ settings.register_profile(
 settings.register_profile("new", settings.get_profile("same"), derandomize=False)
 settings.load_profile(os.environ.get("TIRELIB_EXAMPLES", "same"))
 ROOT = Path(__file__).parents[1]
+PROCESSORS = forked._processors
 os.environ["PYTHONPATH"] = os.pathsep.join(  # what tests start imports this checkout as well
     [str(ROOT), str(ROOT / "bench"), *filter(None, [os.environ.get("PYTHONPATH")])]
 )
@@ -70,14 +72,23 @@ def documents_are_as_their_schemas_say(tmp_path_factory: pytest.TempPathFactory)
     assert not wrong, "\n".join(wrong)
 
 
-@pytest.fixture(scope="module")
-def one_processor() -> Iterator[None]:
-    """Let the tests of a module not copy their process, which costs more than small problems do.
+@pytest.fixture(scope="session", autouse=True)
+def one_process() -> Iterator[None]:
+    """Let tests not copy their process: a copy costs more than small problems do.
 
-    The other tests of the chain, and those of hidden effects, compute in copies, as users do.
+    It forgets in the end what it has kept for the next call, and its memory is copied page by page
+    while the other processes of the run have the processors. Modules with `copies` compute in them.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tirelib.core.forked._processors", lambda: 1)
+        patch.setattr(forked, "_processors", lambda: 1)
+        yield
+
+
+@pytest.fixture(scope="module")
+def copies() -> Iterator[None]:
+    """Let the tests of a module compute in copies of their process, as users do."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(forked, "_processors", PROCESSORS)
         yield
 
 
