@@ -50,7 +50,7 @@ def chromium() -> Iterator[Any]:
         pytest.skip(WITHOUT_CHROMIUM)
     with api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(
-            executable_path=path, args=["--no-sandbox", "--disable-gpu"], timeout=1e3 * PATIENCE
+            executable_path=path, args=["--no-sandbox"], timeout=1e3 * PATIENCE
         )
         yield browser
         browser.close()
