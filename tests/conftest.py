@@ -5,6 +5,8 @@ import os
 import sys
 from collections.abc import Callable, Generator, Iterator
 from contextlib import nullcontext
+from itertools import chain, groupby
+from operator import itemgetter
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ from hypothesis import HealthCheck, settings
 
 from tests import once
 from tests.schema_check import wrong_documents
+from tirelib.core import forked
 
 settings.register_profile(
     "same",
@@ -25,6 +28,11 @@ settings.register_profile(
 settings.register_profile("new", settings.get_profile("same"), derandomize=False)
 settings.load_profile(os.environ.get("TIRELIB_EXAMPLES", "same"))
 ROOT = Path(__file__).parents[1]
+PROCESSORS = forked._processors
+YOUNG = 20_000
+"""New objects after which a process looks for garbage: tests leave little, and soon end."""
+WAITS, LAST = {"bench", "fleet"}, 0.7
+"""Folders whose tests wait, and the share of all other files among which they are spread."""
 os.environ["PYTHONPATH"] = os.pathsep.join(  # what tests start imports this checkout as well
     [str(ROOT), str(ROOT / "bench"), *filter(None, [os.environ.get("PYTHONPATH")])]
 )
@@ -52,7 +60,22 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
             return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(YOUNG)
         gc.enable()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Spread the files whose tests wait among those that compute, and end with none of them.
+
+    Side by side, processes that wait for a line, a cluster or a browser leave processors idle.
+    """
+    files = [list(tests) for _, tests in groupby(items, key=lambda item: item.path)]
+    waits = [tests for tests in files if WAITS & {*tests[0].path.parts}]
+    others = [tests for tests in files if not WAITS & {*tests[0].path.parts}]
+    places = [(LAST * k / len(waits), tests) for k, tests in enumerate(waits)]
+    places += [(k / len(others), tests) for k, tests in enumerate(others)]
+    items[:] = chain.from_iterable(tests for _, tests in sorted(places, key=itemgetter(0)))
 
 
 @pytest.hookimpl(wrapper=True)
@@ -70,14 +93,34 @@ def documents_are_as_their_schemas_say(tmp_path_factory: pytest.TempPathFactory)
     assert not wrong, "\n".join(wrong)
 
 
-@pytest.fixture(scope="module")
-def one_processor() -> Iterator[None]:
-    """Let the tests of a module not copy their process, which costs more than small problems do.
+@pytest.fixture(scope="session", autouse=True)
+def one_process() -> Iterator[None]:
+    """Let tests not copy their process: a copy costs more than small problems do.
 
-    The other tests of the chain, and those of hidden effects, compute in copies, as users do.
+    It forgets in the end what it has kept for the next call, and its memory is copied page by page
+    while the other processes of the run have the processors. Modules with `copies` compute in them.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tirelib.core.forked._processors", lambda: 1)
+        patch.setattr(forked, "_processors", lambda: 1)
+        yield
+
+
+@pytest.fixture(scope="module")
+def copies() -> Iterator[None]:
+    """Let the tests of a module compute in copies of their process, as users do."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(forked, "_processors", PROCESSORS)
+        yield
+
+
+@pytest.fixture(scope="module")
+def rough_figures() -> Iterator[None]:
+    """Let figures of a module be drawn without a search for the places of their axes.
+
+    It takes half of the time; tests/unit/report looks at places.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("matplotlib.figure.Figure.set_layout_engine", lambda *_, **__: None)
         yield
 
 

@@ -2,14 +2,16 @@
 
 import atexit
 import fcntl
+import io
 import os
-import pickle
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
+
+from tirelib.core.forked import _Reader, _Writer
 
 PLACE = "TIRELIB_TESTS_ONCE"
 """Environment variable with the folder that the processes of a run share."""
@@ -56,11 +58,17 @@ def first_alone(name: str) -> Iterator[None]:
         yield
 
 
-def value_once(name: str, make: Callable[[], Value]) -> Value:
-    """Return what the first process to ask for it has made, read back from its file."""
+def value_once(name: str, make: Callable[[], Value], shared: Sequence[object] = ()) -> Value:
+    """Return what the first process to ask for it has made, read back from its file.
+
+    What all processes have, as the effects of the catalogue, may be `shared`: it is not written.
+    """
 
     def fill(folder: Path) -> None:
-        (folder / "value.pickle").write_bytes(pickle.dumps(make()))
+        text = io.BytesIO()
+        _Writer(text, shared).dump(make())
+        (folder / "value.pickle").write_bytes(text.getbuffer())
 
-    found: Value = pickle.loads((once(name, fill) / "value.pickle").read_bytes())
+    text = io.BytesIO((once(name, fill) / "value.pickle").read_bytes())
+    found: Value = _Reader(text, shared).load()
     return found

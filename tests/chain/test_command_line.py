@@ -44,7 +44,7 @@ def run(*words: object) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def place(tmp_path_factory: pytest.TempPathFactory, rough_figures: None) -> Path:
     folder = tmp_path_factory.mktemp("journey")
     write(folder / "set1", cornering_runs())
     write(folder / "day2", cornering_runs(seed=5))

@@ -51,7 +51,9 @@ def campaigns(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def made(campaigns: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+def made(
+    campaigns: Path, tmp_path_factory: pytest.TempPathFactory, rough_figures: None
+) -> tuple[Path, str]:
     out, module, said = tmp_path_factory.mktemp("demo"), demo_module(), io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(said):
         patch.setattr(sys, "argv", ["demo.py", "--data", str(campaigns), "--out", str(out)])

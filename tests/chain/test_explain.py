@@ -18,6 +18,7 @@ from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import read_tire, write_tire
 from tirelib.measured import waveforms
 
+pytestmark = pytest.mark.usefixtures("copies")
 KEYS = {
     "format",
     "tirelib",

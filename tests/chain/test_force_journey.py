@@ -19,7 +19,6 @@ from tirelib.core.errors import TirelibError
 from tirelib.core.parameters import write_tire
 from tirelib.effects import CATALOGUE
 
-pytestmark = pytest.mark.usefixtures("one_processor")
 PLANTED = {"friction_pressure": 0.3, "stiffness_temperature": 0.5, "brush_camber": 0.08}
 PAIR = (
     *("--suspects", "friction_pressure,friction_drift"),

@@ -25,6 +25,7 @@ from tirelib.inference.identify.force_data import force_data
 from tirelib.inference.identify.ring_patch import half_lengths
 from tirelib.physics.brush.predict import PointConditions, PointParameters, predict_forces
 
+pytestmark = pytest.mark.usefixtures("copies")
 TIRE = read_tire("table-6-1").tire
 C_PY, MU = 9e6, 0.92
 ANGLES = np.radians([-8.0, -4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0, 8.0])

@@ -11,8 +11,6 @@ from tests.unit.inference.force_campaigns import steady_runs, write_forces
 from tirelib.cli import program
 from tirelib.core.errors import ParameterError
 
-pytestmark = pytest.mark.usefixtures("one_processor")
-
 
 def document(*words: object) -> dict[str, object]:
     found = CliRunner().invoke(program, list(map(str, words)))

@@ -149,8 +149,8 @@ def test_in_the_middle_of_a_refit_nothing_is_lost(browser: Any, journey: Journey
         second.goto(page.url)
         second.locator("[data-cancel]").click()
         page.get_by_text("add conicity: cancelled").wait_for()
-        state = "[studio.running.length, studio.campaign.current]"
-        assert page.evaluate(state) == [0, before]
+        wait_for(page, "studio.running.length === 0")
+        assert page.evaluate("studio.campaign.current") == before
         page.get_by_role("button", name="Run again").click()
         wait_for(second, BUSY)
         server.kill()  # no goodbye

@@ -1,6 +1,7 @@
 """A campaign played to the FMU gives the document of `tirelib estimate`."""
 
 import json
+import shutil
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -176,16 +177,28 @@ def test_the_checking_script_of_the_documentation_runs(
         assert capsys.readouterr().out.endswith(f"problems: [] differ: {wanted}\n")
 
 
+def thinned(folder: Path, out: Path) -> Path:
+    """Return a campaign of every fourth run of another one."""
+    out.mkdir()
+    shutil.copy(folder / "campaign.toml", out)
+    (out / "runs").symlink_to(folder / "runs")
+    head, *runs = (folder / "runs.csv").read_text().splitlines()
+    (out / "runs.csv").write_text("\n".join([head, *runs[::4], ""]))
+    return out
+
+
 @pytest.mark.shared
 def test_lab_data_give_the_numbers_of_estimate(
     tmp_path: Path, shared: Callable[[str], Path]
 ) -> None:
+    """The calibration is that of all runs."""
     from tirelib.cli.calibrate import calibrate
 
     folder = shared("lab-set1")
+    few = thinned(folder, tmp_path / "few")
     calibration, file = tmp_path / "cal.toml", tmp_path / "x.fmu"
     told(calibrate, str(folder), "--out", str(calibration))
-    told(estimate, str(folder), "--calibration", str(calibration), "--json", str(tmp_path / "e"))
+    told(estimate, str(few), "--calibration", str(calibration), "--json", str(tmp_path / "e"))
     told(
         fmu,
         "build",
@@ -196,7 +209,7 @@ def test_lab_data_give_the_numbers_of_estimate(
         "--samples-per-step",
         "10",
     )
-    told(fmu, "run", str(file), str(folder), "--json", str(tmp_path / "f"))
+    told(fmu, "run", str(file), str(few), "--json", str(tmp_path / "f"))
     assert_equal(json.loads((tmp_path / "f").read_text()), json.loads((tmp_path / "e").read_text()))
 
 

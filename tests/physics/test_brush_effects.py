@@ -85,6 +85,17 @@ def forces(*changes: Any, at: BrushConditions = POINTS, **values: Any) -> np.nda
 BASE = forces()
 
 
+def test_a_changed_state_keeps_all_other_fields_and_an_unknown_one_is_named() -> None:
+    before = state()
+    after = before.but(mu=2.0 * before.mu)
+    for field in fields(BrushState):
+        same = getattr(after, field.name) is getattr(before, field.name)
+        assert same == (field.name != "mu"), field.name
+    assert after.mu == pytest.approx(2.0 * before.mu)
+    with pytest.raises(TypeError, match="no field 'grip'"):
+        before.but(grip=1.0)
+
+
 @pytest.fixture(scope="module")
 def every(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Effect]:
     mine = tmp_path_factory.mktemp("mine") / "mine.py"

@@ -12,7 +12,7 @@ from tirelib.campaign import read_campaign, write_campaign
 from tirelib.inference.compare import Comparison, compare
 from tirelib.report.comparison import write_comparison
 
-pytestmark = pytest.mark.speed
+pytestmark = [pytest.mark.speed, pytest.mark.usefixtures("copies")]
 RUNS = 60
 
 

@@ -13,7 +13,7 @@ from tirelib.inference.diagnose.diagnose import diagnose
 from tirelib.inference.identify.campaign_data import StraightRuns, straight_runs
 from tirelib.model.base import values_of
 
-pytestmark = pytest.mark.speed
+pytestmark = [pytest.mark.speed, pytest.mark.usefixtures("copies")]
 
 EFFECTS = [effect for effect in CATALOGUE.values() if effect.hook != "brush"]
 

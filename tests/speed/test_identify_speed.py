@@ -19,7 +19,7 @@ from tirelib.measured.signal import LowPass
 from tirelib.model.base import BARE, FREE, values_of
 from tirelib.model.solution import solved
 
-pytestmark = pytest.mark.speed
+pytestmark = [pytest.mark.speed, pytest.mark.usefixtures("copies")]
 GOALS = {19: 3.0, 60: 10.0}
 """A third of what is allowed: a slower fit is a regression."""
 

@@ -4,7 +4,8 @@ An effect of stage brush takes a state and a strength and returns a changed stat
 (`BrushState.but`); it never changes its argument.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
+from operator import attrgetter
 from typing import Any
 
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
@@ -91,4 +92,13 @@ class BrushState:
 
     def but(self, **values: Any) -> "BrushState":
         """Return the state with some fields replaced."""
-        return replace(self, **values)
+        held = [*_HELD(self)]
+        for name, value in values.items():
+            if name not in _PLACE:
+                raise TypeError(f"a brush has no field {name!r}; it has {', '.join(_PLACE)}")
+            held[_PLACE[name]] = value
+        return BrushState(*held)
+
+
+_PLACE = {field.name: place for place, field in enumerate(fields(BrushState))}
+_HELD = attrgetter(*_PLACE)

@@ -36,7 +36,7 @@ def brush_state(
     n = len(conditions)
 
     def column(value: Any) -> FloatArray:
-        return np.array(np.broadcast_to(np.asarray(value, dtype=np.float64), (n,)))
+        return np.full(n, value, dtype=np.float64)
 
     p = parameters
     along = p.lateral_stiffness if p.longitudinal_stiffness is None else p.longitudinal_stiffness

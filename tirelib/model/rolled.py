@@ -76,7 +76,7 @@ def made_of(values: Values, points: Operating) -> Made:
         v["innerliner_offset"], v["offset_pressure_slope"], points.pressure, v["pressure"]
     )
     each = (offset, v["liner_share"], spread)
-    places = [np.broadcast_to(np.asarray(x, dtype=float), (len(points),)) for x in each]
+    places = [np.full(len(points), x, dtype=float) for x in each]
     return Made(constants, Gage(*places))
 
 

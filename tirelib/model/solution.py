@@ -8,7 +8,7 @@ Modal damping, which the rolling ring has not, adds what it changes in the linea
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from tirelib.model.chain import (
 )
 from tirelib.model.rolled import Made, made_of
 from tirelib.physics.contact.free_boundary import Start
-from tirelib.physics.rolling.assemble import Unknowns
+from tirelib.physics.rolling.assemble import Unknowns, differ
 from tirelib.physics.rolling.constants import STIFFEST, Constants
 from tirelib.physics.rolling.gage import Gage
 from tirelib.physics.rolling.solve import Rolling, solve
@@ -274,6 +274,4 @@ def parts(changes: Changes, kinds: Sequence[str]) -> tuple[list[Change], list[tu
 
 def same(a: Constants, b: Constants) -> bool:
     """Return whether two rolling rings are made of the same constants."""
-    return all(
-        np.array_equal(getattr(a, field.name), getattr(b, field.name)) for field in fields(a)
-    )
+    return not differ(a, b, Constants.__slots__)

@@ -13,7 +13,7 @@ longitudinal slip these are Eq. (3) and (4) of the dissertation, corrected. Axes
 `tirelib.physics.brush.forces` has the same laws for any pressure; the two agree to rounding.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -226,13 +226,13 @@ def _balance(contact: _Contact, compliance: FloatArray) -> FloatArray:
 
 def _check_shapes(p: PointParameters, at: PointConditions) -> None:
     shapes = {
-        field.name: np.shape(value)
+        name: np.shape(value)
         for part in (p, at)
-        for field in fields(part)
-        if (value := getattr(part, field.name)) is not None
+        for name in part.__slots__
+        if (value := getattr(part, name)) is not None
     }
     try:
-        np.broadcast_shapes(*shapes.values())
+        np.broadcast_shapes(*{*shapes.values()})
     except ValueError:
         many = ", ".join(f"{name} {shape}" for name, shape in shapes.items() if shape)
         raise ShapeError(

@@ -185,7 +185,8 @@ def changed(
 
 def differ(k: Constants, other: Constants, names: Sequence[str]) -> bool:
     """Return whether any of these constants differs."""
-    return not all(np.array_equal(getattr(k, name), getattr(other, name)) for name in names)
+    pairs = ((getattr(k, name), getattr(other, name)) for name in names)
+    return not all(a is b or np.array_equal(a, b) for a, b in pairs)
 
 
 def _of_belt(z: FloatArray, k: Constants, mesh: Mesh) -> FloatArray:

@@ -1,6 +1,6 @@
 """Constants of the rolling ring at every operating point."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -84,10 +84,11 @@ class Constants:
     @classmethod
     def of(cls, **values: Any) -> "Constants":
         """Return constants with every field spread over the points; infinite EA, GA are capped."""
-        columns = np.broadcast_arrays(
-            *[np.atleast_1d(np.asarray(values[field.name], dtype=float)) for field in fields(cls)]
-        )
-        named = dict(zip([field.name for field in fields(cls)], columns, strict=True))
+        named = {name: np.asarray(values[name], dtype=float) for name in cls.__slots__}
+        (n,) = np.broadcast_shapes((1,), *{value.shape for value in named.values()})
+        for name, value in named.items():
+            if value.shape != (n,):
+                named[name] = np.full(n, value)
         for name in ("EA", "GA"):
             named[name] = np.minimum(named[name], STIFFEST)
         return cls(**named)
@@ -101,7 +102,7 @@ class Constants:
 
     def take(self, index: Any) -> "Constants":
         """Return the constants of some points."""
-        return Constants(*[getattr(self, field.name)[index] for field in fields(self)])
+        return Constants(*[getattr(self, name)[index] for name in self.__slots__])
 
     def check(self) -> None:
         """Refuse constants that no tire has.
@@ -111,19 +112,19 @@ class Constants:
         ParameterError
             Names the constant, the point and what is allowed.
         """
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for name in self.__slots__:
+            value = getattr(self, name)
             bad = ~np.isfinite(value)
-            if field.name in _POSITIVE:
+            if name in _POSITIVE:
                 bad |= value <= 0.0
-            elif field.name not in _SIGNED:
+            elif name not in _SIGNED:
                 bad |= value < 0.0
             if bad.any():
                 point = int(np.flatnonzero(bad)[0])
-                sign = "> 0" if field.name in _POSITIVE else ">= 0"
-                sign = "a finite number" if field.name in _SIGNED else f"a finite number {sign}"
+                sign = "> 0" if name in _POSITIVE else ">= 0"
+                sign = "a finite number" if name in _SIGNED else f"a finite number {sign}"
                 raise ParameterError(
-                    f"rolling ring: {field.name} = {value[point]:.6g} at point {point}; {sign} is "
+                    f"rolling ring: {name} = {value[point]:.6g} at point {point}; {sign} is "
                     "needed; check the tire's value and its dependence on pressure and deflection",
                     point=point,
                 )

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 
+from tests.once import value_once
 from tests.synthetic import LATERAL
 from tests.unit.inference.identify.model_waves import TIRE, made_waves
 from tirelib.core.parameters import Number, TireFile
@@ -81,6 +82,10 @@ def add_effect(measured: StraightRuns, model: TireModel, effect: Effect) -> Exte
 @cache
 def added() -> tuple[Extension, TireFile]:
     """Return the planted effect added to a model without it, and the file."""
+    return value_once("planted_added", _added, tuple(CATALOGUE.values()))
+
+
+def _added() -> tuple[Extension, TireFile]:
     file = model_file()
     done = add_effect(runs(EFFECT, STRENGTH), model_of(file), CATALOGUE[EFFECT])
     return done, extended_file(file, done, "hash")

@@ -172,30 +172,31 @@ def test_the_base_is_fitted_once_from_each_start_and_its_whitening_is_about_that
     assert np.std(given.reference.waveform - among.problem.reference.waveform) > 0.0
 
 
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_law_that_ends_at_zero_is_fitted_from_there(lacking: Fitted, side: float) -> None:
+def ends_at_zero(name: str, side: float) -> Effect:
+    """Return a law that has strengths on one side of zero only."""
+
     def softer(state: State, strength: float) -> State:
         if side * strength < 0.0:
             raise ParameterError("no such law")
         return state.but(k_u=state.k_u * (1.0 - 0.5 * np.abs(strength) * state.deflection / 0.02))
 
     low, high = sorted((0.0, 0.5 * side))
-    law = effect(
-        "softer",
-        stage="stiffness",
-        unit="1",
-        low=low,
-        high=high,
-        varies_with=("load",),
-        source="test",
+    return effect(
+        name, stage="stiffness", unit="1", low=low, high=high, varies_with=("load",), source="test"
     )(softer)
+
+
+def test_a_law_that_ends_at_zero_is_fitted_from_there(lacking: Fitted) -> None:
+    sides = {"above": 1.0, "below": -1.0}
+    laws = [ends_at_zero(name, side) for name, side in sides.items()]
     measured = runs(EFFECT, STRENGTH)
-    among = hypotheses(measured, lacking.values, law)
-    found = among.at(("softer",))
-    assert found is not None
-    with_it = Fitted.of(among, found, Yardstick.of(measured))
-    assert side * with_it.strengths[0][0] > 0.1
-    assert with_it.error < 0.7 * lacking.error
+    among = hypotheses(measured, lacking.values, *laws)
+    for name, side in sides.items():
+        found = among.at((name,))
+        assert found is not None
+        with_it = Fitted.of(among, found, Yardstick.of(measured))
+        assert side * with_it.strengths[0][0] > 0.1
+        assert with_it.error < 0.7 * lacking.error
 
 
 def test_each_run_comes_later_by_its_speed() -> None:

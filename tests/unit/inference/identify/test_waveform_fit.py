@@ -77,18 +77,18 @@ def test_the_model_is_found_again_within_its_intervals(fitted: WaveformFit) -> N
 
 
 def test_errors_are_as_large_as_the_covariance_says() -> None:
-    """Chi-square of the errors over eight seeds, set points and all: 64 degrees of freedom.
+    """Chi-square of the errors over four seeds, set points and all: 32 degrees of freedom.
 
-    It scatters by 18 %. Set points that act along the linear ring's slopes, or errors of load that
+    It scatters by 25 %. Set points that act along the linear ring's slopes, or errors of load that
     strain and deflection do not share, make it 1.9 to 2.0.
     """
     total, inside = 0.0, []
-    for seed in range(10, 18):
+    for seed in range(10, 14):
         fit = plain(data(seed, loads=LOADS[::2], repeats=1))
         error = errors(fit)
         total += float(error @ np.linalg.solve(fit.covariance, error))
         inside.append(np.abs(error) < 1.96 * np.sqrt(np.diag(fit.covariance)))
-    assert 0.6 < total / 64.0 < 1.45
+    assert 0.6 < total / 32.0 < 1.45
     assert np.mean(inside) > 0.85
 
 
