@@ -176,6 +176,8 @@ class Hypotheses:
         found = self.at(larger)
         if found is None or not found.plausible:
             return hypothesis  # fewer effects have no fit, or one out of their ranges
+        if not self.explains(found):
+            return None  # what is left is there only beside effects that are not
         if found.p >= hypothesis.p:
             return found
         out = replace(found, p_beside=hypothesis.p)

@@ -132,6 +132,19 @@ def test_an_effect_counts_only_if_its_exact_law_makes_the_runs_likelier(gain: fl
     assert not among.explains(replace(alone, exact_in=(among.base.unnamed,)))
 
 
+def test_what_explains_nothing_without_effects_that_plain_tires_show_is_not_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    among = Hypotheses(planted(3, twist=1.0), FAMILIES)
+    both = among.at(["twist", "bend"])
+    assert both is not None
+    alone = among.without_plain(both)
+    assert alone is not None
+    assert among.added(alone) == ("twist",)
+    monkeypatch.setattr(among, "explains", lambda h: set(h.names) != {"twist"})
+    assert among.without_plain(both) is None
+
+
 def test_what_only_errors_of_laws_explain_is_neither_a_member_nor_a_rival(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
