@@ -36,6 +36,8 @@ HERE = Path(__file__).parent
 OUT = Path(__file__).parents[2] / "tirelib" / "inference" / "statistics"
 FIRST = {"effect": 0.1**2, "shape": 0.01**2}
 """Variances of the fits from which the learning starts."""
+FIRST_OWN = 0.002
+"""Size of a run's own misfit in these fits, over its rms force."""
 LARGEST = 32.0
 """Most by which one tire shows more of the smooth shapes than its family: tires of a rig leave more
 than those of a program, so that the likelihood of the tire decides."""
@@ -61,7 +63,7 @@ def fit_of(family: str, seed: int, quantity: str) -> Fit | None:
         spread = {effect.name: FIRST["effect"] for effect in problem.living}
         groups = problem.remainder(problem.start, problem.solve(problem.start))
         spread |= dict.fromkeys(groups, FIRST["shape"])
-        return problem, posterior(problem, (), spread, problem.whitener(OWN[2]))
+        return problem, posterior(problem, (), spread, problem.whitener(FIRST_OWN))
     except TirelibError as error:
         say(f"{family} {seed} {quantity}: {error}")
         return None

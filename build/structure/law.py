@@ -45,9 +45,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=OUT)
     parser.add_argument("--families", default=",".join(FAMILIES))
+    parser.add_argument("--ratio", default="1.50", help="error ratio, as in the names of files")
     parser.add_argument("--seeds", type=seeds, help="1-60 or 1,5,7-9; every one by default")
     options = parser.parse_args()
-    say(f"{'law error, share alike':36}" + heading(LAW) + " |" + heading(SHARE))
+    say(f"{'error of the law | share alike':36}" + heading(LAW) + " |" + heading(SHARE))
     with one_thread():
         for family in options.families.split(","):
             others = [f for f in load(TABLE)[0] if f.name != family]
@@ -59,7 +60,7 @@ def main() -> None:
 def files(options: argparse.Namespace, family: str) -> list[Path]:
     """Return the campaigns of a family in which one known effect is hidden."""
     found = []
-    for file in sorted((options.out / family).glob("*.npz")):
+    for file in sorted((options.out / family).glob(f"*-{options.ratio}.npz")):
         seed, kind = file.stem.split("-")[:2]
         if kind in CATALOGUE and (options.seeds is None or int(seed) in options.seeds):
             found.append(file)
@@ -84,7 +85,8 @@ def likelihoods(file: Path, others: list[Family]) -> tuple[np.ndarray, np.ndarra
     except TirelibError as error:
         say(f"{file.name}: {error}")
         return None
-    best = [likeliest(fit, fit.views(problem, OWN), others, law) for law in LAW]
+    views = fit.views(problem, OWN)
+    best = [likeliest(fit, views, others, law) for law in LAW]
     by_law = np.array([null.likelihood for null in best])
     null, laws = best[by_law.argmax()], (LAW[by_law.argmax()],)
     done, alike = beyond_base(fit, laws, null.view)
@@ -115,7 +117,7 @@ def fitted(file: Path, others: list[Family]) -> tuple[StrainProblem, Posterior]:
     return problem, fit
 
 
-def likeliest(fit: Posterior, views: list[View], others: list[Family], law: float) -> Null:
+def likeliest(fit: Posterior, views: Sequence[View], others: list[Family], law: float) -> Null:
     """Return the test with the largest likelihood, whatever it allows to look alike."""
     each = (
         null_at(fit, view, family, Errors((law,), share), {})

@@ -47,6 +47,8 @@ SEEDS = [*range(2, 60, 3), *range(302, 360, 3)]
 """Tires of the library's table; their plans have 15 runs."""
 FIRST = {"effect": 0.02**2, "shape": 0.005**2}
 """Variances of the fit from which the learning starts."""
+FIRST_OWN = 0.0005
+"""Size of a run's own misfit in this fit, over its rms strain."""
 Fit = tuple[StrainProblem, Posterior]
 
 
@@ -115,7 +117,7 @@ def fit_of(file: Path) -> Fit | None:
         spread = {effect.name: FIRST["effect"] for effect in problem.living}
         groups = problem.remainder(problem.start, problem.solve(problem.start))
         spread |= dict.fromkeys(groups, FIRST["shape"])
-        fit = posterior(problem, (), spread, problem.whitener(OWN[1]))
+        fit = posterior(problem, (), spread, problem.whitener(FIRST_OWN))
     except TirelibError as error:
         say(f"{file.name}: {error}")
         return None

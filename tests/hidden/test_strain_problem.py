@@ -161,3 +161,19 @@ def test_whitening_is_the_inverse_of_noise_and_set_points(problem: StrainProblem
     kept = np.abs(covariance - np.eye(len(covariance)))
     assert np.abs(np.diag(covariance) - 1.0).max() < 0.25
     assert kept.mean() < 0.03
+
+
+def test_misfit_shapes_are_in_one_group_each_and_reach_round_the_turn(
+    problem: StrainProblem,
+) -> None:
+    groups = problem.remainder(problem.start, problem.solve(problem.start))
+    assert len(groups) == 12
+    degrees = np.rad2deg(np.abs(GRID))
+    half = np.rad2deg(problem.half_angle.max())
+    far = np.concatenate([rows for name, rows in groups.items() if name.endswith(", far belt")])
+    near = np.concatenate([rows for name, rows in groups.items() if name.endswith("contact")])
+    # a shape that is centred more than five half contact angles away is even in the contact
+    assert np.ptp(far[..., degrees < half], axis=-1).max() < 0.01 * np.abs(near).max()
+    # the top of the tire is covered
+    largest = np.abs(far).max(axis=(0, 1))
+    assert largest[degrees > 170.0].min() > 0.5 * largest.max()

@@ -108,7 +108,7 @@ def compiled(fmu: Path, folder: Path, *flags: str) -> Path:
     library = folder / "binaries" / "linux64" / "StrainTire.so"
     library.unlink()
     subprocess.run(
-        ["gcc", "-O1", "-shared", "-fPIC", *flags, *files, "-lm", "-o", library],
+        ["gcc", "-O2", "-shared", "-fPIC", *flags, *files, "-lm", "-o", library],
         check=True,
         cwd=folder / "sources",
     )

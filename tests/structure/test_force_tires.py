@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from force_tires.bench import problem_of
 from force_tires.families import FAMILIES, Changes, Setting
-from force_tires.learn import FIRST, OUT, families_sha256
+from force_tires.learn import FIRST, FIRST_OWN, OUT, families_sha256
 from force_tires.plans import case
 
 from tirelib.core.threads import one_thread
 from tirelib.inference.statistics.hypothesis import judged
-from tirelib.inference.statistics.null import OWN
 from tirelib.inference.statistics.plain import Family, load
 from tirelib.inference.statistics.posterior import posterior
 
@@ -71,7 +70,7 @@ def test_a_plain_tire_is_rejected_only_if_it_hides_something(
     with one_thread():
         found = judged(
             problem,
-            posterior(problem, (), spread, problem.whitener(OWN[2])),
+            posterior(problem, (), spread, problem.whitener(FIRST_OWN)),
             table,
             0.05,
             own_effects=0,

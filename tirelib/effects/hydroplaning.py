@@ -25,11 +25,11 @@ With half or double of it the law fits simulated tires as well: docs/theory/verd
 def hydroplaning(state: State, strength: float) -> State:
     """Water in the gap ahead of the contact presses on the tread, with speed squared.
 
-    At a distance x ahead of the leading edge the gap is x^2 / 2 R0. Where it is less than the depth
-    h of the water, up to l = sqrt(2 R0 h), the share 1 - (x / l)^2 of the water has to give way. It
-    presses with s rho v^2 / 2 times this share, v = R Omega, over the belt's width b. The water
-    carries the share 1 - exp(-F / Fz) of the load, with F = 2/3 l b s rho v^2 / 2; the tread
-    carries the rest.
+    The belt leaves the road along a tangent, so that the gap at a distance x ahead of the leading
+    edge is about x^2 / 2 R0. Where it is less than the depth h of the water, up to
+    l = sqrt(2 R0 h), the share 1 - (x / l)^2 of the water has to give way. It presses with
+    s rho v^2 / 2 times this share, v = R Omega, over the belt's width b. The water carries the
+    share 1 - exp(-F / Fz) of the load, with F = 2/3 l b s rho v^2 / 2; the tread carries the rest.
     """
     c = state.contact
     dynamic = 0.5 * WATER * (state.radius * state.conditions.omega) ** 2

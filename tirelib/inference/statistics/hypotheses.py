@@ -161,9 +161,10 @@ class Hypotheses:
     def without_plain(self, hypothesis: Hypothesis) -> Hypothesis | None:
         """Return the hypothesis of those of its effects that are larger than plain tires show.
 
-        It is not rejected where the given one is not. None where no effect is larger. The error
-        that its law may have can hide how large an effect is. An effect stays as well where it is
-        larger with an exact law, and the hypothesis without it would be rejected for it.
+        It is not rejected where the given one is not. None where no effect is larger, or where
+        those that are explain nothing by themselves (`explains`). The error that its law may have
+        can hide how large an effect is. An effect stays as well where it is larger with an exact
+        law, and the hypothesis without it would be rejected for it.
         """
         had = len(self.had)
         larger = [
@@ -185,7 +186,10 @@ class Hypotheses:
         return out
 
     def _missed(self, hypothesis: Hypothesis, index: int) -> bool:
-        """Return whether the hypothesis without an effect is rejected for it: `against_larger`."""
+        """Return whether the hypothesis without an effect is rejected for it: `against_larger`.
+
+        It is fitted here if it was not yet.
+        """
         if hypothesis.exact_plain[index] > self.false_alarm:
             return False
         gone = hypothesis.names[index]

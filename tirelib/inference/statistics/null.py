@@ -42,7 +42,7 @@ SIZES = 2.0 ** np.arange(-2, 2)
 tire that leaves little shows a weak effect; one that leaves far more than its family has something
 unknown, so that twice as much is the most that is excused."""
 APART = (0.5, 1.0, 2.0)
-"""Size of what one tire shows away from the contact over that in it: where it leaves little in
+"""Size of what one tire shows beside the contact over that in it: where it leaves little in
 the contact, and as much as others on the free belt, the free belt does not stand out."""
 SIZE_STD = 1.5
 """Standard deviation of the logarithm of this size."""

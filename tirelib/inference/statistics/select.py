@@ -9,7 +9,7 @@ that is like any one of them is covered. A hypothesis is rejected as well where 
 effects explains the runs much better (`tirelib.inference.statistics.rival`), whether the rival
 itself is rejected or not, or where one effect more makes the runs much likelier
 (`Hypotheses.against_larger`), and gives way to fewer of its effects that explain the runs as well
-(`Hypotheses.simpler`). It counts only if each of its effects explains something
+(`Hypotheses.simpler`). A hypothesis counts only if each of its effects explains something
 (`Hypotheses.explains`). Every other hypothesis with p > alpha is in the set, without those of its
 effects that are no larger than plain tires show (`Hypothesis.p_plain`). Its smallest members are
 what the data say (Ferrari and Yang 2015): none in it, nothing is missing; one smallest member, that
@@ -150,6 +150,7 @@ def select(
             if likeliest is base or not hypotheses.supported(likeliest):
                 return done("unknown", ())
             return done("form_inadequate", [likeliest])
+        # where no hypothesis explains anything by itself, one of more effects may
         leaders = (fitted or [h for h in every if h.plausible])[:LEADERS]
     leader = leaders[0] if leaders else None
     while many and leader is not None and leader.plausible and not np.isfinite(leader.looseness):
@@ -181,7 +182,8 @@ def _with_loose_laws(hypotheses: Hypotheses) -> Hypothesis | None:
 def _smallest(members: Sequence[Hypothesis | None]) -> tuple[str, list[Hypothesis]]:
     """Return the verdict on members of the confidence set, and the smallest of them.
 
-    None is one that has no effect: that nothing is missing is rejected, so it is something unknown.
+    None is one of which no effect is left (`Hypotheses.without_plain`): that nothing is missing is
+    rejected, so it is something unknown.
     """
     every = list(dict.fromkeys(filter(None, members)))
     least = [h for h in every if not any(set(less.names) < set(h.names) for less in every)]

@@ -162,4 +162,5 @@ def test_a_needless_effect_is_flagged_as_not_significant() -> None:
     assert "not_significant" in done.flags
     # one more coordinate never makes the fit worse: what it leaves, and the priors, together
     assert done.after.hypothesis.fit.cost <= done.before.hypothesis.fit.cost
-    assert done.after.error == pytest.approx(done.before.error, rel=0.01)
+    # the error does not count the priors: measured are .7 % more
+    assert done.after.error <= done.before.error * 1.01

@@ -8,6 +8,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.effects import Effect, effect
+from tirelib.inference.statistics.null import OWN
 from tirelib.inference.statistics.plain import Family
 from tirelib.inference.statistics.problem import Point
 
@@ -35,7 +36,7 @@ class Solved:
     rest: FloatArray
 
 
-LEAST_OWN = 0.0005
+LEAST_OWN = OWN[0]
 """Size of a sample's own misfit at which there is none."""
 
 

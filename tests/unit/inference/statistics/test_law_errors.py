@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from tests.unit.inference.statistics.linear_problem import family
+from tests.unit.inference.statistics.linear_problem import N, family
 from tests.unit.inference.statistics.test_larger import WAYS, Loud, planted
 from tirelib.inference.statistics.hypotheses import Hypotheses
 from tirelib.inference.statistics.hypothesis import Hypothesis
 from tirelib.inference.statistics.law_errors import LAWS, Likelihoods, law_errors
 from tirelib.inference.statistics.null import OWN
+from tirelib.inference.statistics.problem import Whitening
+from tirelib.inference.statistics.views import Views
 
 FAMILIES = (family(40, 1, "first"), family(40, 2, "second"))
 
@@ -81,3 +83,36 @@ def test_a_law_whose_errors_explain_all_and_which_itself_explains_nothing_is_not
     wrong, _, among = hypothesis(toy, "twist")
     assert wrong.likelihood > wrong.exact + 20.0
     assert not among.supported(wrong)
+
+
+@pytest.mark.parametrize("misfit", [0.0, 3.0, 30.0])
+def test_the_likeliest_size_of_a_misfit_is_found_without_trying_all(misfit: float) -> None:
+    toy = planted(5, twist=1.0)
+    toy.measured = toy.measured + misfit * np.random.default_rng(1).standard_normal(N)
+    found, likelihoods, among = hypothesis(toy, "twist")
+    views = found.fit.views(among.problem, OWN)
+    sizes = [view.own for view in views]
+    by_size = [likelihoods._best([view], likelihoods.exact)[0].view.own for view in views]
+    assert by_size == sizes == list(OWN)
+    every = [
+        max(null.likelihood for null in likelihoods._best([view], likelihoods.exact))
+        for view in views
+    ]
+    best = likelihoods._best(views, likelihoods.exact)[0].view.own
+    assert best == OWN[int(np.argmax(every))]
+
+
+def test_normal_equations_are_made_once_and_only_where_they_are_asked_for() -> None:
+    found, _, among = hypothesis(planted(5, twist=1.0), "twist")
+    asked: list[float] = []
+
+    def whitener(own: float) -> Whitening:
+        asked.append(own)
+        return among.problem.whitener(own)
+
+    views = Views(found.fit.rows, found.fit.rest, whitener, OWN)
+    assert not asked
+    assert views[3] is views[3]
+    assert sorted(asked) == [OWN[0], OWN[3]]  # what no size changes, and the one
+    assert [view.own for view in views[2:5]] == list(OWN[2:5])
+    assert len(views) == len(OWN)

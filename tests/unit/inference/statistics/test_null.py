@@ -207,3 +207,11 @@ def test_a_size_is_as_likely_as_its_inverse_and_both_parts_count_alike(ratio: fl
     one = float(np.exp(null.SIZE_STD))
     assert null.Size(one, one).log_prior == pytest.approx(-0.5)
     assert null.Size(1.0, 1.0).log_prior == 0.0
+
+
+def test_shapes_far_from_the_contact_do_not_go_with_the_size_of_the_others() -> None:
+    size = null.Size(4.0, 0.5)
+    assert size.of("load, contact") == 4.0
+    assert size.of("load, free belt") == 0.5
+    assert size.of("load, far belt") == 1.0
+    assert size.of("tread_load") == null.LARGEST
