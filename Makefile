@@ -28,14 +28,14 @@ studio: $(STAMP)
 test: $(STAMP)
 	$(MAKE) --jobs=2 lint suite
 
-# A file to each process; two processes more than cores, as tests of the bench and the browser wait.
+# A file to each process; one process more than cores, as tests of the bench and the browser wait.
 # In the order of the folders: what is short, tests/unit, comes last; files that wait are spread among
 # the others (tests/conftest.py). One thread in each process. Memory in large pages, which a process
 # keeps: a tenth less processor time; what is not Linux with glibc reads no such variable.
 KEPT := glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold=33554432:glibc.malloc.trim_threshold=1073741824
 suite: $(STAMP)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 GLIBC_TUNABLES=$(KEPT) PYTHONDONTWRITEBYTECODE= \
-		$(BIN)/python -m pytest --dist=loadfile --no-loadscope-reorder --numprocesses=$$($(BIN)/python -c "import os; print(os.cpu_count() + 2)")
+		$(BIN)/python -m pytest --dist=loadfile --no-loadscope-reorder --numprocesses=$$($(BIN)/python -c "import os; print(os.cpu_count() + 1)")
 
 lint: $(STAMP)
 	$(BIN)/ruff check
