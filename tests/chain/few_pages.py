@@ -3,7 +3,7 @@
 Called with the names of these, separated by commas, and the arguments of ``sphinx-build``.
 The tree of links beside each page takes a sixth of a build, and the index of its words another
 tenth; neither can warn of anything that a page says. Plots are drawn without a search for the
-places of their axes, which takes half of their time.
+places of their axes, which takes half of their time; only the full build sees a search that fails.
 """
 
 import sys

@@ -92,7 +92,7 @@ def test_a_changed_state_keeps_all_other_fields_and_an_unknown_one_is_named() ->
         same = getattr(after, field.name) is getattr(before, field.name)
         assert same == (field.name != "mu"), field.name
     assert after.mu == pytest.approx(2.0 * before.mu)
-    with pytest.raises(TypeError, match="no field 'grip'"):
+    with pytest.raises(TypeError, match="'grip'"):
         before.but(grip=1.0)
 
 

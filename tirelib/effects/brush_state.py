@@ -4,8 +4,7 @@ An effect of stage brush takes a state and a strength and returns a changed stat
 (`BrushState.but`); it never changes its argument.
 """
 
-from dataclasses import dataclass, fields
-from operator import attrgetter
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray
@@ -92,13 +91,4 @@ class BrushState:
 
     def but(self, **values: Any) -> "BrushState":
         """Return the state with some fields replaced."""
-        held = [*_HELD(self)]
-        for name, value in values.items():
-            if name not in _PLACE:
-                raise TypeError(f"a brush has no field {name!r}; it has {', '.join(_PLACE)}")
-            held[_PLACE[name]] = value
-        return BrushState(*held)
-
-
-_PLACE = {field.name: place for place, field in enumerate(fields(BrushState))}
-_HELD = attrgetter(*_PLACE)
+        return replace(self, **values)

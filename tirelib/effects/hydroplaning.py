@@ -10,7 +10,8 @@ WATER = 1000.0
 """Density, [kg/m^3]."""
 DEPTH = 0.001
 """Depth of the water, [m]: the middle of what UN Regulation 117 allows where it measures wet grip.
-With half or double of it the law fits simulated tires as well: docs/theory/verdict_numbers.md."""
+With half or double of this depth the law is no further off on simulated tires:
+docs/theory/verdict_numbers.md."""
 
 
 @effect(

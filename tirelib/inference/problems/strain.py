@@ -40,7 +40,8 @@ from tirelib.physics.rolling.solve import Rolling
 OWN = 0.004
 """A run's own misfit over its rms strain, in the contact."""
 BESIDE = 5.0
-"""Half contact angles up to which the belt is bent by the contact; beyond, it is nearly round."""
+"""Half contact angles up to which the contact bends the belt; beyond, the belt is nearly round.
+Half and double of it: docs/theory/verdict_numbers.md."""
 UNKNOWN_NOISE = 0.005
 """Noise over the rms strain where there are no repeats."""
 

@@ -42,8 +42,8 @@ SIZES = 2.0 ** np.arange(-2, 2)
 tire that leaves little shows a weak effect; one that leaves far more than its family has something
 unknown, so that twice as much is the most that is excused."""
 APART = (0.5, 1.0, 2.0)
-"""Size of what one tire shows beside the contact over that in it: where it leaves little in
-the contact, and as much as others on the free belt, the free belt does not stand out."""
+"""Ratios of what one tire shows beside the contact to what it shows in the contact. A tire that
+leaves little in the contact may leave as much as others beside it, which is no fault."""
 SIZE_STD = 1.5
 """Standard deviation of the logarithm of this size."""
 OWN = tuple(0.00025 * 2.0 ** np.arange(7))
@@ -51,7 +51,7 @@ OWN = tuple(0.00025 * 2.0 ** np.arange(7))
 chooses."""
 
 FREE, FAR = ", free belt", ", far belt"
-"""Ends of the names of shapes that stand beside the contact, and far away from it."""
+"""Ends of the names of groups of shapes: beside the contact, and far away from it."""
 
 Products = tuple[FloatArray, FloatArray]
 """B r, (m, k), and r' r, (k,), of k residuals r."""
