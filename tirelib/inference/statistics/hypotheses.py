@@ -13,6 +13,7 @@ from tirelib.core.forked import forked
 from tirelib.inference.statistics.hypothesis import Hypothesis, judged
 from tirelib.inference.statistics.plain import Family, pooled
 from tirelib.inference.statistics.posterior import (
+    FAR,
     ROUGH,
     ROUNDS,
     Posterior,
@@ -25,6 +26,10 @@ from tirelib.inference.statistics.rival import p_against
 KINKED = 3.0
 """A fit gains what it promised to first order, or up to so many times as much where a law has a
 kink: 35 campaigns, docs/theory/inference.md."""
+
+REJECTED = 2.0
+"""What the model without further effects leaves, over what noise leaves, from which on its fit need
+not settle: it lacks something strong."""
 
 
 class Hypotheses:
@@ -75,6 +80,8 @@ class Hypotheses:
         self.had = problem.start.effects
         self.effects = {effect.name: effect for effect in problem.living}
         self.problem, self.base = self._begun(problem)
+        if self.base.p > false_alarm:
+            self.base = self._settled(self.base)
         self._made: dict[frozenset[str], Hypothesis | None] = {frozenset(): self.base}
 
     def at(self, names: Sequence[str], near: Hypothesis | None = None) -> Hypothesis | None:
@@ -234,6 +241,8 @@ class Hypotheses:
         added = self.added(hypothesis)
         for k, name in enumerate(added, len(self.had)):
             less = self._made.get(frozenset(added) - {name})
+            if less is self.base:
+                less = self._base_against(hypothesis.exact_in[k] - less.unnamed)
             if less is not None and hypothesis.exact_in[k] <= less.unnamed:
                 return False
         return True
@@ -245,8 +254,22 @@ class Hypotheses:
         is one of all that might be there, so that its likelihood ratio has to be n times 1 / alpha.
         """
         added = len(self.added(hypothesis))
-        odds = np.log(len(self.effects) / self.false_alarm)
-        return bool(hypothesis.exact - self.base.exact >= added * odds)
+        odds = added * np.log(len(self.effects) / self.false_alarm)
+        base = self._base_against(hypothesis.exact - self.base.exact - odds)
+        return bool(hypothesis.exact - base.exact >= odds)
+
+    def _base_against(self, ahead: float) -> Hypothesis:
+        """Return the base; if it may catch up with a hypothesis so far ahead, its fit settles."""
+        if 0.0 < ahead < 0.5 * self.base.fit.short:
+            self.base = self._made[frozenset()] = self._settled(self.base)
+        return self.base
+
+    def _settled(self, base: Hypothesis) -> Hypothesis:
+        """Return the base from a fit that settles; what is less than a nat short of it does."""
+        if base.fit.short < 2.0:
+            return base
+        fit = self._fit(self.problem, near=base.fit, loose_from=FAR)
+        return self._tested(self.problem, fit)
 
     def added(self, hypothesis: Hypothesis) -> tuple[str, ...]:
         """Return the names of a hypothesis' further effects."""
@@ -304,6 +327,7 @@ class Hypotheses:
     def _fit(self, problem: Problem, **how: Any) -> Posterior:
         """Return the fit without further effects."""
         whiten = problem.whitener(self.own)
+        how = {"loose_from": REJECTED, **how}
         return posterior(problem, self.had, self.spread, whiten, progress=self._told, **how)
 
     def _told(self, label: str) -> None:

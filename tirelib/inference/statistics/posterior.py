@@ -43,9 +43,9 @@ PATIENT = 20
 """Steps after which each coordinate is damped by itself: few fits take as many, and those that do
 have met a kink."""
 FAR, LOOSE = 10.0, 0.03
-"""A model that leaves more than `FAR` of what noise leaves is settled by steps that bring less than
-`LOOSE` of that surplus: it lacks something strong, and how near it comes to the runs without that
-decides nothing."""
+"""A model that leaves more than `FAR` of what noise leaves is settled by steps that promise less
+than `LOOSE` of that surplus: it lacks something strong, and how near it comes to the runs without
+that decides nothing."""
 WHITENING_MOVE, WHITENING_STEPS = 1.0, 25
 """Move of a coordinate, in standard deviations, below which a whitening that follows the fit is
 kept, for it hardly changes any more; and steps after which it is kept in any case: following the
@@ -80,6 +80,8 @@ class Posterior:
         Covariance of the block's coordinates.
     cost : float
         J at the point.
+    short : float
+        By how much J may fall further.
     far : bool
         Whether the model leaves more than `FAR` of what noise leaves.
     lookalike : float
@@ -94,6 +96,7 @@ class Posterior:
     widths: FloatArray
     covariance: FloatArray
     cost: float
+    short: float
     far: bool
     lookalike: float
 
@@ -173,6 +176,7 @@ def posterior(
     start: Point | None = None,
     damping: float = 0.0,
     settled: float = SETTLED,
+    loose_from: float = FAR,
     progress: Callable[[str], None] | None = None,
 ) -> Posterior:
     """Fit the model with effects.
@@ -201,6 +205,8 @@ def posterior(
         Damping of the first step, relative to the curvature by each coordinate.
     settled : float
         Fall of the cost that a step has to promise.
+    loose_from : float
+        What a model leaves, over what noise leaves, from which on `LOOSE` of the surplus is enough.
     progress : callable, optional
 
     Raises
@@ -231,7 +237,7 @@ def posterior(
         dz, cost = here.step(), here.cost
         promised = here.fall(dz)
         unit = max(1.0, cost / rest.size)
-        little = settled * unit
+        little = max(settled * unit, LOOSE * (cost - loose_from * rest.size))
         there = promised < little
         there = there and bool((np.abs(dz[asked]) < STILL * here.deviation[asked]).all())
         lower = None if there else downhill(problem, here, point, solved, whiten, damping, own)
@@ -247,7 +253,7 @@ def posterior(
         last = move
         point, solved, rest = lower.point, lower.solved, lower.rest
         moved, damping = lower.moved, lower.damping
-        brings = max(little, SETTLED * unit, LOOSE * (cost - FAR * rest.size))
+        brings = max(little, SETTLED * unit)
         idle = idle + 1 if cost - lower.cost < brings else 0
         if idle == IDLE:
             cost = lower.cost
@@ -279,6 +285,7 @@ def posterior(
         width[:count],
         covariance,
         cost,
+        little,
         bool(cost > FAR * rest.size),
         problem.lookalike,
     )

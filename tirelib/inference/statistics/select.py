@@ -102,7 +102,7 @@ def select(
     base, alpha = hypotheses.base, false_alarm
 
     def done(kind: str, members: Sequence[Hypothesis]) -> Verdict:
-        best = members[0] if members else base
+        best = members[0] if members else hypotheses.base
         return Verdict(kind, tuple(hypotheses.added(m) for m in members), best, hypotheses)
 
     if base.p > alpha:
@@ -147,7 +147,7 @@ def select(
             return done(*_smallest([hypotheses.without_plain(h) for h in members]))
         if staying:
             likeliest = max(filter(None, simpler.values()), key=lambda h: h.likelihood)
-            if likeliest is base or not hypotheses.supported(likeliest):
+            if likeliest is hypotheses.base or not hypotheses.supported(likeliest):
                 return done("unknown", ())
             return done("form_inadequate", [likeliest])
         # where no hypothesis explains anything by itself, one of more effects may
