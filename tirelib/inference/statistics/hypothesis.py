@@ -208,7 +208,7 @@ def _p_plain(nulls: Sequence[Null], fit: Posterior, index: int) -> float:
     """Return the p-value of an effect that is as large as plain tires show it, by these tests."""
     name, place, p = fit.names[index], fit.place(index), 0.0
     for null in nulls:
-        weighed, size = null.likeliest, null.size.of(name)
+        weighed, size = null.likeliest, null.size.of(name, null.gage)
         strength = weighed.mean(weighed.normal.right)[place]
         left = strength - size * null.family.means.get(name, 0.0)
         shown = size**2 * null.shown.get(name, 0.0) * np.eye(left.size)

@@ -148,7 +148,7 @@ def null_of(
     wide = fit.widths**2
     wide[len(fit.point.base) :] *= PRIOR**2
     allowed = {BASE: wide, **law_errors(fit, errors, view)}
-    return Null(view, family, family.spread(fit.sizes), allowed, fit.sides, size)
+    return Null(view, family, family.spread(fit.sizes), allowed, fit.sides, fit.gage, size)
 
 
 def law_errors(fit: Posterior, errors: Errors, view: View) -> dict[str, float | FloatArray]:

@@ -17,16 +17,16 @@ Multiple Testing, 1993). Otherwise the groups of shapes that plain tires show mo
 limit for all.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
 
 from tirelib.core.arrays import FloatArray
 from tirelib.inference.statistics.normal import Weighed, beside, taken
-from tirelib.inference.statistics.plain import BASE, LARGEST, ROUGHLY, Family
+from tirelib.inference.statistics.plain import BASE, ROUGHLY, Family
+from tirelib.inference.statistics.size import Size, sizes
 from tirelib.inference.statistics.views import View
 
 PRIOR = 0.5
@@ -37,47 +37,12 @@ OPPOSITE = 0.5
 """What a score counts on the side of zero where the effect's range is not, as sidewalls that harden
 where they are pressed: something else is there, which plain tires show more often than an effect
 and which gets no name. Half and double of it: docs/theory/verdict_numbers.md."""
-SIZES = 2.0 ** np.arange(-2, 2)
-"""Sizes of what one tire shows over what its family shows, among which its likelihood chooses. A
-tire that leaves little shows a weak effect; one that leaves far more than its family has something
-unknown, so that twice as much is the most that is excused."""
-APART = (0.5, 1.0, 2.0)
-"""Ratios of what one tire shows beside the contact to what it shows in the contact. A tire that
-leaves little in the contact may leave as much as others beside it, which is no fault."""
-SIZE_STD = 1.5
-"""Standard deviation of the logarithm of this size."""
 OWN = tuple(0.00025 * 2.0 ** np.arange(7))
 """Sizes of the misfit that each run has for itself, over its rms strain, among which its likelihood
 chooses."""
 
-FREE, FAR = ", free belt", ", far belt"
-"""Ends of the names of groups of shapes: beside the contact, and far away from it."""
-
 Products = tuple[FloatArray, FloatArray]
 """B r, (m, k), and r' r, (k,), of k residuals r."""
-
-
-class Size(NamedTuple):
-    """How much one tire shows over what its family shows, in general and beside the contact."""
-
-    whole: float
-    free: float
-
-    def of(self, block: str) -> float:
-        """Return the size of a block: of an effect it is at most `LARGEST`.
-
-        What a tire shows far away from the contact says nothing of what it shows elsewhere.
-        """
-        if "," not in block:
-            return min(self.whole, LARGEST)
-        if block.endswith(FAR):
-            return 1.0
-        return self.free if block.endswith(FREE) else self.whole
-
-    @property
-    def log_prior(self) -> float:
-        """Log density, up to a constant."""
-        return float(-0.125 * (np.log(self.whole * self.free) / SIZE_STD) ** 2)
 
 
 class Null:
@@ -94,6 +59,8 @@ class Null:
         What the hypothesis leaves open in addition to that.
     sides : mapping of block to sign
         Effects of one number whose range lies on this side of zero.
+    gage : container of str
+        Effects of gages and rig, by name.
     size : Size, optional
         The only size of what the tire shows; the likeliest one by default.
 
@@ -114,11 +81,12 @@ class Null:
         shown: Mapping[str, float],
         allowed: Mapping[str, float | FloatArray],
         sides: Mapping[str, float],
+        gage: Container[str] = (),
         size: Size | None = None,
     ) -> None:
         blocks = view.normal.blocks
         self.view, self.family, self.shown, self.allowed = view, family, shown, allowed
-        self.sides = sides
+        self.sides, self.gage = sides, gage
         self.names = [name for name in blocks if name != BASE]
         self.blocks = [blocks[name] for name in self.names]
         self.counts = np.array([block.stop - block.start for block in self.blocks], dtype=float)
@@ -128,10 +96,10 @@ class Null:
             self._shapes[block] = "," in name or name.startswith(ROUGHLY)
         self._weighed = []
         always = view.normal.spread(allowed)
-        for each in _sizes(family.largest, shown) if size is None else [size]:
-            variance = {name: each.of(name) ** 2 * square for name, square in shown.items()}
+        for each in sizes(family.largest, shown) if size is None else [size]:
+            variance = {name: each.of(name, gage) ** 2 * s for name, s in shown.items()}
             spread = view.normal.spread(variance) + always
-            means = {name: each.of(name) * mean for name, mean in family.means.items()}
+            means = {name: each.of(name, gage) * mean for name, mean in family.means.items()}
             self._weighed.append((each, Weighed(view.normal.about(means), spread)))
 
     @cached_property
@@ -223,7 +191,7 @@ class Null:
 
     def about(self, view: View, size: Size | None = None) -> "Null":
         """Return the same test of other normal equations, at one size of what the tire shows."""
-        other = Null(view, self.family, self.shown, self.allowed, self.sides, size)
+        other = Null(view, self.family, self.shown, self.allowed, self.sides, self.gage, size)
         other.usual = self.usual
         return other
 
@@ -328,13 +296,3 @@ def _orthonormal(gram: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(gram)
     kept = values > len(values) * np.finfo(float).eps * values[-1]
     return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
-
-
-def _sizes(largest: float, blocks: Iterable[str]) -> list[Size]:
-    """Return `SIZES`, and further ones up to the largest of a family's tires."""
-    whole: list[float] = SIZES.tolist()
-    while whole[-1] < largest:
-        whole.append(2.0 * whole[-1])
-    apart = APART if any(FREE in name for name in blocks) else (1.0,)
-    each = [Size(size, size * share) for size in whole for share in apart]
-    return [size for size in each if whole[0] <= size.free <= whole[-1]]

@@ -18,6 +18,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.inference.statistics.normal import Weighed
+from tirelib.inference.statistics.size import FAR, LARGEST
 from tirelib.inference.statistics.views import View
 
 ROUNDS = 60
@@ -29,8 +30,6 @@ EVEN = 0.25
 forty tires of one family hardly show, those of another may. It counts as a change of what is
 measured, in which one effect is as good as another, and does not hold where families cover each
 other (`covering`). Half and double of it: docs/theory/verdict_numbers.md."""
-LARGEST = 2.0
-"""Most by which one tire shows more of everything than its family."""
 TINY = 1e-8
 """Least variance while they are learned."""
 BASE, ROUGHLY = "base", "roughly "
@@ -94,7 +93,10 @@ class Family:
         if self.least:
             return shown
         mean = float(np.mean([shown[k] * size for k, size in sizes.items() if k in shown]))
-        least = {k: EVEN**2 * mean / size if size else 0.0 for k, size in sizes.items()}
+        least = {
+            k: EVEN**2 * mean / size if size and not k.endswith(FAR) else 0.0
+            for k, size in sizes.items()
+        }
         return {k: max(shown.get(k, 0.0), least[k]) for k in sizes}
 
     def on(self, blocks: Mapping[str, slice], count: int) -> FloatArray:

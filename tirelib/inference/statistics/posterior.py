@@ -130,6 +130,11 @@ class Posterior:
         one = (e for e in self.point.effects if e.components == 1 and e.low * e.high == 0.0)
         return {effect.name: effect.toward for effect in one}
 
+    @property
+    def gage(self) -> frozenset[str]:
+        """Names of the effects at the gage, of the model or beside it."""
+        return frozenset(e.name for e in self.point.effects if e.hook == "gage")
+
     def strength(self, name: str) -> FloatArray | None:
         """Return the strength of an effect, of the model or beside it; None if it has none."""
         pairs = zip(self.point.effects, self.point.strengths, strict=True)
