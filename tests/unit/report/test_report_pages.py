@@ -83,7 +83,9 @@ def hostile(world: World) -> World:
 
 
 @pytest.fixture(scope="module")
-def calibration_page(hostile: World, tmp_path_factory: pytest.TempPathFactory) -> Page:
+def calibration_page(
+    hostile: World, tmp_path_factory: pytest.TempPathFactory, rough_figures: None
+) -> Page:
     folder = tmp_path_factory.mktemp("pages") / "new" / "calibration"
     written = write_calibration_report(hostile.trained, folder, held_out=HELD_OUT)
     assert written == folder / "index.html"
@@ -91,7 +93,9 @@ def calibration_page(hostile: World, tmp_path_factory: pytest.TempPathFactory) -
 
 
 @pytest.fixture(scope="module")
-def estimate_page(hostile: World, tmp_path_factory: pytest.TempPathFactory) -> Page:
+def estimate_page(
+    hostile: World, tmp_path_factory: pytest.TempPathFactory, rough_figures: None
+) -> Page:
     observations = hostile.observations["set1"]
     header = replace(observations.headers[0], name=HOSTILE)
     return Page(

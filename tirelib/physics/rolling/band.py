@@ -5,8 +5,9 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from scipy.linalg import lapack
 
-from tirelib.core.arrays import FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray
 
 WIDTH = 4
 """Unknowns of a node."""
@@ -41,6 +42,61 @@ class Matrix:
     right: FloatArray
     lower: FloatArray
     corner: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Factors:
+    """A matrix whose bands are factored.
+
+    Attributes
+    ----------
+    lu : list of (factors, pivots), n_points
+        LAPACK's.
+    across : shape (n_points, n_inner, BORDER)
+        Solutions of the bands for the right sides of the border.
+    lower, corner : shape (n_points, BORDER, n_inner), (n_points, BORDER, BORDER)
+        Lines below, and what the border's unknowns leave of them.
+    """
+
+    lu: list[tuple[FloatArray, Any]]
+    across: FloatArray
+    lower: FloatArray
+    corner: FloatArray
+
+    @classmethod
+    def of(cls, m: Matrix) -> "Factors":
+        """Factor a matrix, whose band is overwritten."""
+        lu = [lapack.dgbtrf(one.T, BAND, BAND, overwrite_ab=1)[:2] for one in m.band]
+        across = _band_solved(lu, m.right)
+        return cls(lu, across, m.lower, m.corner - m.lower @ across)
+
+    def take(self, chosen: BoolArray) -> "Factors":
+        """Return those of some points."""
+        lu = [pair for pair, wanted in zip(self.lu, chosen, strict=True) if wanted]
+        return Factors(lu, self.across[chosen], self.lower[chosen], self.corner[chosen])
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return the solutions (n_points, n_unknowns, n_right)."""
+        inner = self.across.shape[1]
+        out = np.empty_like(right)
+        own = _band_solved(self.lu, right[:, :inner])
+        rest = right[:, inner:] - self.lower @ own
+        try:
+            edge = np.linalg.solve(self.corner, rest)
+        except np.linalg.LinAlgError:
+            edge = np.full_like(rest, np.nan)
+        out[:, inner:] = edge
+        out[:, :inner] = own - self.across @ edge
+        return out
+
+
+def _band_solved(lu: list[tuple[FloatArray, Any]], right: FloatArray) -> FloatArray:
+    """Return the solutions of the bands alone."""
+    # transposed, so that LAPACK finds every right side in one piece
+    turned = right.swapaxes(1, 2).copy()
+    for (factors, pivots), sides in zip(lu, turned, strict=True):
+        lapack.dgbtrs(factors, BAND, BAND, sides.T, pivots, overwrite_b=1)
+    return turned.swapaxes(1, 2)
 
 
 @cache

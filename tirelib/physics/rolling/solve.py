@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import lapack
 
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ConvergenceError, ParameterError
@@ -17,7 +16,7 @@ from tirelib.physics.rolling.assemble import (
     matrix,
     residual,
 )
-from tirelib.physics.rolling.band import BAND, BORDER, Matrix
+from tirelib.physics.rolling.band import BORDER, Factors
 from tirelib.physics.rolling.constants import Constants
 from tirelib.physics.rolling.gage import Gage, strain
 from tirelib.physics.rolling.mesh import COARSE, FINE, PATCH, Mesh, mesh, to_grid
@@ -35,6 +34,10 @@ LONGEST_STEP = 0.008
 TURN = np.array([1.0, 1.0, 0.05])
 """Weights of the displacements in a step, and of a section's rotation, [m/rad]."""
 MAX_ITERATIONS = 80
+NEAR = 2e-5
+"""Last step after which the derivative is kept, [m]."""
+FALL = 0.01
+"""How much less than the step before it a step with a kept derivative has to be."""
 PATIENT = 20
 """Iterations after which steps are halved: sticking and sliding may take turns."""
 SMALLEST_ANGLE = 0.02
@@ -215,22 +218,26 @@ def solve(
 
 def slopes(found: Rolling, by: Sequence[Unknowns]) -> list[Unknowns]:
     """Return how the solution moves for slopes of the residual, by the implicit function."""
-    step = solve_border(
-        matrix(found.x, found.z, found.contact, found.constants, found.mesh),
-        np.concatenate([_column(each) for each in by], axis=2),
-    )
+    derivative = matrix(found.x, found.z, found.contact, found.constants, found.mesh)
+    step = Factors.of(derivative).solve(np.concatenate([_column(each) for each in by], axis=2))
     return [_unknowns(-step[..., j]) for j in range(step.shape[2])]
 
 
 def _newton(k: Constants, start: Unknowns, grid: Mesh, tolerance: float) -> tuple[Unknowns, int]:
-    """Return the solution to a tolerance [m], and the iterations that it took."""
+    """Return the solution to a tolerance [m], and the iterations that it took.
+
+    Near the solution the factored derivative serves for further steps, as long as they fall fast.
+    """
     x = Unknowns(start.node.copy(), start.depth.copy(), start.rolling.copy())
     open_ = np.arange(len(k))
+    factors, before = None, np.inf
     for iteration in range(MAX_ITERATIONS):
         part, here = k.take(open_), x.take(open_)
         rest, z, c = residual(here, part, grid)
-        step = solve_border(matrix(here, z, c, part, grid), _column(rest))
-        move = _unknowns(step[..., 0])
+        fresh = factors is None
+        if factors is None:
+            factors = Factors.of(matrix(here, z, c, part, grid))
+        move = _unknowns(factors.solve(_column(rest))[..., 0])
         reach = np.abs(move.node[..., :3] * TURN).max(axis=(1, 2))
         reach = np.maximum(reach, np.maximum(np.abs(move.depth), np.abs(move.rolling)))
         if not np.isfinite(reach).all():
@@ -240,9 +247,15 @@ def _newton(k: Constants, start: Unknowns, grid: Mesh, tolerance: float) -> tupl
             share = np.minimum(share, 0.5)
         after = here.plus(move, -share)
         x.node[open_], x.depth[open_], x.rolling[open_] = after.node, after.depth, after.rolling
-        open_ = open_[~(reach < tolerance)]
+        longest = float(reach.max())
+        # a step with a kept derivative leaves as much less than itself as it is less than the last
+        left = reach if fresh else reach * (longest / before / FALL)
+        still = ~(left < tolerance)
+        open_ = open_[still]
         if not open_.size:
             return x, iteration + 1
+        near = longest < NEAR if fresh else longest < FALL * before
+        factors, before = factors.take(still) if near else None, longest
     worst = int(open_[np.argmax(reach)])
     raise ConvergenceError(
         f"rolling ring: point {worst} at {k.load[worst]:.0f} N still moves by "
@@ -323,24 +336,3 @@ def _unknowns(flat: FloatArray) -> Unknowns:
     n, inner = flat.shape[0], flat.shape[1] - BORDER
     node = np.concatenate([flat[:, inner : inner + 4], flat[:, :inner]], axis=1)
     return Unknowns(node.reshape(n, -1, 4), flat[:, -2].copy(), flat[:, -1].copy())
-
-
-def solve_border(m: Matrix, right: FloatArray) -> FloatArray:
-    """Return the solutions (n_points, n_unknowns, n_right) of the bordered band systems."""
-    inner = m.band.shape[1]
-    out = np.empty_like(right)
-    # transposed, so that LAPACK finds every right side in one piece
-    turned = np.concatenate([m.right, right[:, :inner]], axis=2).swapaxes(1, 2).copy()
-    for p in range(len(turned)):
-        lu, pivots, _ = lapack.dgbtrf(m.band[p].T, BAND, BAND, overwrite_ab=1)
-        lapack.dgbtrs(lu, BAND, BAND, turned[p].T, pivots, overwrite_b=1)
-    both = turned.swapaxes(1, 2)
-    corner = m.corner - m.lower @ both[..., :BORDER]
-    rest = right[:, inner:] - m.lower @ both[..., BORDER:]
-    try:
-        edge = np.linalg.solve(corner, rest)
-    except np.linalg.LinAlgError:
-        edge = np.full_like(rest, np.nan)
-    out[:, inner:] = edge
-    out[:, :inner] = both[..., BORDER:] - both[..., :BORDER] @ edge
-    return out
