@@ -137,7 +137,7 @@ def null_at(
 ) -> Null:
     """Return the test of a fit whose law is off by so much, with more variances by block."""
     allowed = {BASE: fit.widths**2, **law_errors(fit, errors, view), **more}
-    return Null(view, family, family.spread(fit.sizes), allowed, fit.sides)
+    return Null(view, family, family.spread(fit.sizes), allowed, fit.sides, fit.gage)
 
 
 if __name__ == "__main__":

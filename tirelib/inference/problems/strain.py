@@ -18,7 +18,6 @@ from tirelib.inference.identify.delay import STD, UNIT, earlier
 from tirelib.inference.identify.random_effects import scales, tangents
 from tirelib.inference.problems.strain_laws import (
     LOOKALIKE_SHARE,
-    SHAPES,
     as_large,
     beside,
     law_errors,
@@ -26,8 +25,9 @@ from tirelib.inference.problems.strain_laws import (
 )
 from tirelib.inference.problems.strain_living import in_base, living
 from tirelib.inference.problems.strain_prior import MEAN, WIDTH, as_in_literature
+from tirelib.inference.problems.strain_shapes import smooth_shapes
 from tirelib.inference.problems.strain_slopes import StrainSlopes, StrainSolved, changes_at
-from tirelib.inference.problems.whiten_strain import INSIDE, Whitener
+from tirelib.inference.problems.whiten_strain import Whitener
 from tirelib.inference.statistics.problem import FOLLOWED, Point
 from tirelib.measured.waveforms import GRID
 from tirelib.model import solution
@@ -39,9 +39,6 @@ from tirelib.physics.rolling.solve import Rolling
 
 OWN = 0.004
 """A run's own misfit over its rms strain, in the contact."""
-BESIDE = 5.0
-"""Half contact angles up to which the contact bends the belt; beyond, the belt is nearly round.
-Half and double of it: docs/theory/verdict_numbers.md."""
 UNKNOWN_NOISE = 0.005
 """Noise over the rms strain where there are no repeats."""
 
@@ -291,17 +288,8 @@ class StrainProblem:
         return earlier(rows, self.data.points.omega, -solved.delay)
 
     def remainder(self, point: Point, solved: StrainSolved) -> dict[str, FloatArray]:
-        """Return smooth shapes round the turn, by where they are and what they go with."""
-        columns = SHAPES.columns(solved.waveform, self.half_angle, self.data.points, GRID)
-        knots = SHAPES.knots
-        centre = np.sinh(np.linspace(-np.arcsinh(SHAPES.reach), np.arcsinh(SHAPES.reach), knots))
-        place = np.digitize(np.abs(centre), (INSIDE, BESIDE))
-        groups = {}
-        for k, name in enumerate(("constant", "load", "pressure", "speed")):
-            rows = columns[k * knots : (k + 1) * knots]
-            for j, where in enumerate(("contact", "free belt", "far belt")):
-                groups[f"{name}, {where}"] = rows[place == j]
-        return groups
+        """Return smooth shapes round the turn: `smooth_shapes`."""
+        return smooth_shapes(solved.waveform, self.half_angle, self.data.points)
 
     def roughly(
         self, point: Point, solved: StrainSolved, slopes: FloatArray, count: int

@@ -11,16 +11,11 @@ from tirelib.inference.identify.discrepancy import (
     REFERENCE_LOAD,
     REFERENCE_OMEGA,
     REFERENCE_PRESSURE,
-    Discrepancy,
     bumps,
 )
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import Coordinate
 
-SHAPES = Discrepancy(
-    inside=1.0, outside=0.15, knots=38, reach=20.0, by_load=1.0, by_pressure=1.0, by_speed=1.0
-)
-"""Smooth shapes over the wheel angle, to the top of a tire whose contact is 18 deg long."""
 KNOTS = 32
 """Bumps of an error's shape round the whole turn: what a sidewall or a heavy spot does, and gets
 wrong, ends nowhere."""

@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.inference.statistics.null import PRIOR, Null, Size
+from tirelib.inference.statistics.null import PRIOR, Null
 from tirelib.inference.statistics.plain import BASE, ROUGHLY, Family
 from tirelib.inference.statistics.posterior import Posterior
+from tirelib.inference.statistics.size import Size
 from tirelib.inference.statistics.views import View
 
 LAWS = (0.03, 0.1, 0.3)
