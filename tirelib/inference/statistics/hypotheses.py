@@ -232,31 +232,30 @@ class Hypotheses:
         return max(as_good, key=lambda h: h.likelihood, default=None)
 
     def explains(self, hypothesis: Hypothesis) -> bool:
-        """Return whether each of its effects, with an exact law, makes the runs likelier.
+        """Return whether each of its effects, with exact laws, makes the runs likelier.
 
-        Compared are the hypotheses without the effect that were fitted. Something without a name
-        may stand beside either. The error that a law may have is flexible: where the runs are no
-        likelier with the exact law than without the effect, the error explains something else.
+        Compared are the hypotheses without the effect that were fitted, all laws exact: the error
+        that a law may have is flexible, and would explain something else. The effect is one of all
+        that might be there, so that its likelihood ratio has to be n / alpha.
         """
         added = self.added(hypothesis)
-        for k, name in enumerate(added, len(self.had)):
-            less = self._made.get(frozenset(added) - {name})
-            if less is self.base:
-                less = self._base_against(hypothesis.exact_in[k] - less.unnamed)
-            if less is not None and hypothesis.exact_in[k] <= less.unnamed:
-                return False
-        return True
+        fewer = (self._made.get(frozenset(added) - {name}) for name in added)
+        return all(self._likelier(hypothesis, less) for less in fewer if less is not None)
 
     def supported(self, hypothesis: Hypothesis) -> bool:
         """Return whether its laws, taken as exact, explain the runs better than no effect does.
 
-        Where only the errors of laws make the runs likelier, something else is there. Each effect
-        is one of all that might be there, so that its likelihood ratio has to be n times 1 / alpha.
+        Where only the errors of laws make the runs likelier, something else is there. The
+        likelihood ratio has to be n / alpha for each effect.
         """
-        added = len(self.added(hypothesis))
-        odds = added * np.log(len(self.effects) / self.false_alarm)
-        base = self._base_against(hypothesis.exact - self.base.exact - odds)
-        return bool(hypothesis.exact - base.exact >= odds)
+        return self._likelier(hypothesis, self.base, len(self.added(hypothesis)))
+
+    def _likelier(self, hypothesis: Hypothesis, less: Hypothesis, more: int = 1) -> bool:
+        """Return whether exact laws of so many effects more make the runs likelier: `explains`."""
+        odds = more * np.log(len(self.effects) / self.false_alarm)
+        if less is self.base:
+            less = self._base_against(hypothesis.exact - less.exact - odds)
+        return bool(hypothesis.exact - less.exact >= odds)
 
     def _base_against(self, ahead: float) -> Hypothesis:
         """Return the base; if it may catch up with a hypothesis so far ahead, its fit settles."""
