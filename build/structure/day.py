@@ -25,6 +25,9 @@ RIG_SAMPLES = 50
 """Samples of a rig channel that a run's mean is of."""
 PLANS = (66, 66, 15)
 """Runs of a campaign: two thirds of the seeds have the long plan."""
+PLAIN_TIRES = (*range(2, 60, 3), *range(302, 360, 3), *(s for s in range(400, 430) if s % 3 < 2))
+"""Seeds of the plain tires of the library's table: forty of a family have plans of 15 runs, twenty
+of 66."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from structure.cases import NONE, Case, case_file, save_case
-from structure.day import day, measured
+from structure.day import PLAIN_TIRES, day, measured
 from structure.elements import Elements
 from structure.family import Family
 from structure.planted import planted_cases
@@ -33,7 +33,9 @@ OUT = Path(__file__).parents[1] / "out" / "structure"
 
 
 def seeds(text: str) -> list[int]:
-    """Return the seeds of `1-3,7`."""
+    """Return the seeds of `1-3,7`, or those of the plain tires in the library's table."""
+    if text == "table":
+        return list(PLAIN_TIRES)
     out: list[int] = []
     for part in text.split(","):
         first, _, last = part.partition("-")
@@ -99,7 +101,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--family", choices=FAMILIES, required=True)
-    parser.add_argument("--seeds", required=True, type=seeds, help="1-60 or 1,5,7-9")
+    parser.add_argument("--seeds", required=True, type=seeds, help="1-60 or 1,5,7-9, or table")
     parser.add_argument("--kinds", default=NONE, help="none, known, unknown, or names")
     parser.add_argument("--ratios", default="1.5,1.2,1.1", help="of the base's error")
     parser.add_argument("--out", type=Path, default=OUT)

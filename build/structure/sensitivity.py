@@ -24,7 +24,7 @@ from structure.cases import NONE
 from structure.learn import FAMILIES, OUT, TABLE, Fit, fits_of, kept_fit, say
 from structure.make import seeds
 from tirelib.core.threads import one_thread
-from tirelib.inference.statistics import hypothesis, null, plain
+from tirelib.inference.statistics import hypothesis, null, plain, size
 from tirelib.inference.statistics.hypothesis import judged
 from tirelib.inference.statistics.plain import Family, load
 
@@ -37,7 +37,7 @@ NUMBERS = ("PRIOR", "MORE", "SIZES", "SIZE_STD", "OWN", "OPPOSITE", "EVEN")
 @contextmanager
 def scaled(name: str, factor: float) -> Iterator[None]:
     """Change a number of `tirelib.inference.statistics` for a while, wherever it is imported."""
-    places = [module for module in (null, hypothesis, plain) if hasattr(module, name)]
+    places = [module for module in (size, null, hypothesis, plain) if hasattr(module, name)]
     old = getattr(places[0], name)
     new: Any = tuple(factor * np.array(old)) if isinstance(old, tuple) else factor * old
     for module in places:

@@ -118,18 +118,19 @@ def test_an_effect_stays_without_which_the_hypothesis_would_be_rejected(
     assert among.without_plain(shown) is not shown
 
 
-@pytest.mark.parametrize("gain", [0.0, 0.1])
-def test_an_effect_counts_only_if_its_exact_law_makes_the_runs_likelier(gain: float) -> None:
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_an_effect_counts_only_if_its_exact_law_makes_the_runs_likelier(share: float) -> None:
     among = Hypotheses(planted(3, twist=1.0), FAMILIES)
     alone, both = among.at(["twist"]), among.at(["twist", "bend"])
     assert alone is not None
     assert both is not None
     assert among.explains(alone)
+    # the likelihood ratio is that of one of three effects at five percent
+    odds = share * np.log(3 / 0.05)
     # the hypothesis with "bend" alone was not fitted, and "twist" is not weighed
-    likelier = tuple(alone.unnamed + gain if name == "bend" else -np.inf for name in both.names)
-    assert among.explains(replace(both, exact_in=likelier)) is (gain > 0.0)
+    assert among.explains(replace(both, exact=alone.exact + odds)) is (share > 1.0)
     # one effect is weighed against none
-    assert not among.explains(replace(alone, exact_in=(among.base.unnamed,)))
+    assert among.explains(replace(alone, exact=among.base.exact + odds)) is (share > 1.0)
 
 
 def test_what_explains_nothing_without_effects_that_plain_tires_show_is_not_told(

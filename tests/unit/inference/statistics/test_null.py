@@ -9,7 +9,7 @@ from scipy import stats
 
 from tests.unit.inference.statistics.linear_problem import SHAPES, N, Toy, drawn, family
 from tirelib.core.arrays import FloatArray
-from tirelib.inference.statistics import null
+from tirelib.inference.statistics import null, size
 from tirelib.inference.statistics.hypothesis import Hypothesis, judged
 from tirelib.inference.statistics.null import standard
 from tirelib.inference.statistics.plain import Family
@@ -133,15 +133,15 @@ def test_the_free_belt_has_a_size_of_its_own(monkeypatch: pytest.MonkeyPatch) ->
     def judged_by(families: tuple[Family, ...]) -> Hypothesis:
         random = np.random.default_rng(2)
         toy = Belt(random.standard_normal(N))
-        size = np.sqrt(families[0].shown()["smooth, free belt"])
-        toy.measured = toy.measured + 1.8 * size * random.standard_normal(SHAPES) @ toy.there
+        shown = np.sqrt(families[0].shown()["smooth, free belt"])
+        toy.measured = toy.measured + 1.8 * shown * random.standard_normal(SHAPES) @ toy.there
         fit = posterior(toy, (), families[0].shown(), toy.whitener(0.001))
         return judged(toy, fit, families, 0.05, own_effects=0)
 
     families = tuple(belt(each) for each in FAMILIES)
     apart = judged_by(families)
     assert apart.null.size.free == 2.0 * apart.null.size.whole
-    monkeypatch.setattr(null, "APART", (1.0,))
+    monkeypatch.setattr(size, "APART", (1.0,))
     together = judged_by(families)
     assert together.null.size.free == together.null.size.whole
     assert together.likelihood < apart.likelihood
@@ -196,22 +196,3 @@ def test_an_effect_that_is_there_moves_from_zero_and_not_from_what_its_family_sh
     place = found.view.normal.blocks["bend"].start
     # 300 samples of unit noise against rows of unit size, five standard errors
     assert found.moved("bend")[place] == pytest.approx(2.0, abs=5.0 / np.sqrt(N))
-
-
-@pytest.mark.parametrize("ratio", [0.25, 0.5, 1.0, 2.0])
-def test_a_size_is_as_likely_as_its_inverse_and_both_parts_count_alike(ratio: float) -> None:
-    whole, free = 1.7, 1.7 * ratio
-    prior = null.Size(whole, free).log_prior
-    assert prior == pytest.approx(null.Size(1.0 / whole, 1.0 / free).log_prior)
-    assert prior == pytest.approx(null.Size(free, whole).log_prior)
-    one = float(np.exp(null.SIZE_STD))
-    assert null.Size(one, one).log_prior == pytest.approx(-0.5)
-    assert null.Size(1.0, 1.0).log_prior == 0.0
-
-
-def test_shapes_far_from_the_contact_do_not_go_with_the_size_of_the_others() -> None:
-    size = null.Size(4.0, 0.5)
-    assert size.of("load, contact") == 4.0
-    assert size.of("load, free belt") == 0.5
-    assert size.of("load, far belt") == 1.0
-    assert size.of("tread_load") == null.LARGEST

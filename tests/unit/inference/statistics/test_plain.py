@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.unit.inference.statistics.linear_problem import PLAIN, Toy, drawn, family
-from tirelib.inference.statistics import null
+from tirelib.inference.statistics import size
 from tirelib.inference.statistics.hypothesis import judged
 from tirelib.inference.statistics.null import Null
 from tirelib.inference.statistics.plain import learn, load, pooled, save
@@ -43,7 +43,7 @@ def test_a_familys_mean_is_learned_apart_from_its_spread(tmp_path) -> None:
 
 def test_a_mean_counts_as_what_it_takes_off_the_residual(monkeypatch: pytest.MonkeyPatch) -> None:
     """A tire with the family's mean is to its test as one without is to a test without a mean."""
-    monkeypatch.setattr(null, "SIZES", np.array([1.0]))
+    monkeypatch.setattr(size, "SIZES", np.array([1.0]))
     plain = replace(family(40), largest=1.0)
     common = replace(plain, means={"swell": COMMON})
     measured = drawn(np.random.default_rng(2))
@@ -93,3 +93,13 @@ def test_families_together_spread_by_what_they_show_to_either_side() -> None:
     assert together(0.0) == pytest.approx(variance)
     assert together(COMMON) == together(-COMMON) == pytest.approx(variance + COMMON**2)
     assert together(COMMON, -COMMON, 0.0) == pytest.approx(variance + 2.0 / 3.0 * COMMON**2)
+
+
+def test_a_block_far_from_the_contact_shows_no_more_than_its_family_does() -> None:
+    """What all blocks show on the average says nothing of what is far from the contact."""
+    blocks = {"bend": 1, "load, contact": 1, "load, far belt": 1}
+    squares = np.array([[1.0, 1e-8, 1e-8]])
+    shown = replace(family(40), blocks=blocks, squares=squares)
+    found = shown.spread(dict.fromkeys(blocks, 1.0))
+    assert found["load, contact"] == pytest.approx(0.25**2 / 3.0)
+    assert found["load, far belt"] == pytest.approx(1e-8)
