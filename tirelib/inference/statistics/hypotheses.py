@@ -13,7 +13,6 @@ from tirelib.core.forked import forked
 from tirelib.inference.statistics.hypothesis import Hypothesis, judged
 from tirelib.inference.statistics.plain import Family, pooled
 from tirelib.inference.statistics.posterior import (
-    FAR,
     ROUGH,
     ROUNDS,
     Posterior,
@@ -267,7 +266,7 @@ class Hypotheses:
         """Return the base from a fit that settles; what is less than a nat short of it does."""
         if base.fit.short < 2.0:
             return base
-        fit = self._fit(self.problem, near=base.fit, loose_from=FAR)
+        fit = self._fit(self.problem, near=base.fit, loose_from=np.inf)
         return self._tested(self.problem, fit)
 
     def added(self, hypothesis: Hypothesis) -> tuple[str, ...]:

@@ -43,9 +43,9 @@ PATIENT = 20
 """Steps after which each coordinate is damped by itself: few fits take as many, and those that do
 have met a kink."""
 FAR, LOOSE = 10.0, 0.03
-"""A model that leaves more than `FAR` of what noise leaves is settled by steps that promise less
-than `LOOSE` of that surplus: it lacks something strong, and how near it comes to the runs without
-that decides nothing."""
+"""A model that leaves more than `FAR` of what noise leaves is settled by steps that bring less than
+`LOOSE` of that surplus: it lacks something strong, and how near it comes to the runs without that
+decides nothing."""
 WHITENING_MOVE, WHITENING_STEPS = 1.0, 25
 """Move of a coordinate, in standard deviations, below which a whitening that follows the fit is
 kept, for it hardly changes any more; and steps after which it is kept in any case: following the
@@ -181,7 +181,7 @@ def posterior(
     start: Point | None = None,
     damping: float = 0.0,
     settled: float = SETTLED,
-    loose_from: float = FAR,
+    loose_from: float = np.inf,
     progress: Callable[[str], None] | None = None,
 ) -> Posterior:
     """Fit the model with effects.
@@ -211,7 +211,8 @@ def posterior(
     settled : float
         Fall of the cost that a step has to promise.
     loose_from : float
-        What a model leaves, over what noise leaves, from which on `LOOSE` of the surplus is enough.
+        What a model leaves, over what noise leaves, from which on its fit has settled as soon as a
+        step promises less than `LOOSE` of the surplus.
     progress : callable, optional
 
     Raises
@@ -258,7 +259,7 @@ def posterior(
         last = move
         point, solved, rest = lower.point, lower.solved, lower.rest
         moved, damping = lower.moved, lower.damping
-        brings = max(little, SETTLED * unit)
+        brings = max(little, SETTLED * unit, LOOSE * (cost - FAR * rest.size))
         idle = idle + 1 if cost - lower.cost < brings else 0
         if idle == IDLE:
             cost = lower.cost
