@@ -209,17 +209,20 @@ def floor_of(error: ModelError, hypothesis: Hypothesis, alpha: float) -> float:
 
     It is all of the error of the model that the hypothesis describes, unless the hypothesis is
     rejected; then it is what is left when the model takes what the largest standard score is of,
-    and its numbers follow, to first order.
+    and its numbers follow, to first order and as their priors allow.
     """
     if hypothesis.p > alpha or error.whiten is None:
         return error.value
-    null, rows = hypothesis.null, hypothesis.fit.rows
-    blocks, move = null.view.normal.blocks, null.moved(hypothesis.against)
-    taken = sum(
-        np.tensordot(move[blocks[name]], rows[name], axes=1) for name in (BASE, hypothesis.against)
+    fit = hypothesis.fit
+    base = fit.rows[BASE]
+    rows = error.whiten(np.concatenate([base, fit.rows[hypothesis.against]]))
+    rows = rows.reshape(len(rows), -1)
+    rest = error.whiten(error.rest[None]).ravel()
+    prior = np.eye(len(base), len(rows)) / fit.widths[:, None]
+    follows, *_ = np.linalg.lstsq(
+        np.concatenate([rows.T, prior]), np.concatenate([rest, np.zeros(len(base))]), rcond=None
     )
-    left = error.whiten((error.rest - taken)[None])
-    return min(error.value, float(np.sqrt(np.mean(left**2))))
+    return min(error.value, float(np.sqrt(np.mean((rest - follows @ rows) ** 2))))
 
 
 class StrainModels(Models[Fitted, ModelError | None]):

@@ -122,8 +122,9 @@ class Hypotheses:
         likelihood ratio of n / p in favour of one of them has at most the probability p where none
         is there (Bonferroni, and Royall as in `tirelib.inference.statistics.rival`), with errors of
         laws of a known size. Something without a name may stand beside either. Where the likeliest
-        further effect is out of its range, or no larger than plain tires show, it is something else
-        that makes the runs likelier, and no effect is there.
+        further effect is out of its range, no larger than plain tires show, or part of a hypothesis
+        that does not explain something by each effect (`explains`), it is something else that makes
+        the runs likelier, and no effect is there.
         """
         larger = self._larger(hypothesis)
         if hypothesis.p <= self.false_alarm or not larger:
@@ -131,6 +132,8 @@ class Hypotheses:
         rival, further = max(larger, key=lambda each: each[0].exact_in[each[1]])
         p = self._p_beside(hypothesis, rival, further)
         if not rival.plausible or max(p, rival.exact_plain[further]) > self.false_alarm:
+            return hypothesis
+        if not self.explains(rival):
             return hypothesis
         out = replace(hypothesis, rival=" and ".join(self.added(rival)), p_rival=p)
         self._made[frozenset(self.added(hypothesis))] = out
@@ -234,12 +237,17 @@ class Hypotheses:
         """Return whether each of its effects, with exact laws, makes the runs likelier.
 
         Compared are the hypotheses without the effect that were fitted, all laws exact: the error
-        that a law may have is flexible, and would explain something else. The effect is one of all
-        that might be there, so that its likelihood ratio has to be n / alpha.
+        that a law may have is flexible, and would explain something else. That nothing is missing
+        is rejected already; beside others an effect is one of all that might be there, so that its
+        likelihood ratio has to be n / alpha.
         """
         added = self.added(hypothesis)
         fewer = (self._made.get(frozenset(added) - {name}) for name in added)
-        return all(self._likelier(hypothesis, less) for less in fewer if less is not None)
+        return all(
+            self._likelier(hypothesis, less, 0 if less is self.base else 1)
+            for less in fewer
+            if less is not None
+        )
 
     def supported(self, hypothesis: Hypothesis) -> bool:
         """Return whether its laws, taken as exact, explain the runs better than no effect does.
@@ -249,8 +257,8 @@ class Hypotheses:
         """
         return self._likelier(hypothesis, self.base, len(self.added(hypothesis)))
 
-    def _likelier(self, hypothesis: Hypothesis, less: Hypothesis, more: int = 1) -> bool:
-        """Return whether exact laws of so many effects more make the runs likelier: `explains`."""
+    def _likelier(self, hypothesis: Hypothesis, less: Hypothesis, more: int) -> bool:
+        """Return whether it is likelier by what so many effects have to bring, all laws exact."""
         odds = more * np.log(len(self.effects) / self.false_alarm)
         if less is self.base:
             less = self._base_against(hypothesis.exact - less.exact - odds)

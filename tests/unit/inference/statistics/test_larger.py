@@ -129,8 +129,8 @@ def test_an_effect_counts_only_if_its_exact_law_makes_the_runs_likelier(share: f
     odds = share * np.log(3 / 0.05)
     # the hypothesis with "bend" alone was not fitted, and "twist" is not weighed
     assert among.explains(replace(both, exact=alone.exact + odds)) is (share > 1.0)
-    # one effect is weighed against none
-    assert among.explains(replace(alone, exact=among.base.exact + odds)) is (share > 1.0)
+    # that nothing is missing is rejected already
+    assert among.explains(replace(alone, exact=among.base.exact + share - 1.0)) is (share > 1.0)
 
 
 def test_what_explains_nothing_without_effects_that_plain_tires_show_is_not_told(
