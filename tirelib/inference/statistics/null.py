@@ -249,18 +249,6 @@ class Null:
         covariance = np.asarray(np.linalg.inv(inner), dtype=float)
         return covariance @ weighed.right(weighed.normal.right)[block], covariance
 
-    def moved(self, name: str) -> FloatArray:
-        """Return how coefficients of all rows move, (m,), if a further effect is there.
-
-        Those of the effect itself (or of more of a group) are from zero.
-        """
-        weighed, right = self.likeliest, self.likeliest.normal.right
-        block, spread = self.blocks[self.names.index(name)], weighed.root**2
-        spread[block] += self._more(weighed)[block]
-        after, before = Weighed(self.view.normal, spread).mean(right), weighed.mean(right)
-        before[block] = -self.likeliest.normal.mean[block]
-        return after - before
-
     def angle(self, one: str, other: str) -> float:
         """Return the smallest angle between two effects' signatures as this test weighs them.
 

@@ -27,7 +27,7 @@ SETTLED = 0.01
 START = 0.02**2
 EVEN = 0.25
 """Least that a tire shows of one block, over what its family shows of all on the average: what
-forty tires of one family hardly show, those of another may. It counts as a change of what is
+the tires of one family hardly show, those of another may. It counts as a change of what is
 measured, in which one effect is as good as another, and does not hold where families cover each
 other (`covering`). Half and double of it: docs/theory/verdict_numbers.md."""
 TINY = 1e-8

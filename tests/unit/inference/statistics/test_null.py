@@ -188,11 +188,3 @@ def test_a_tire_that_shows_a_multiple_of_its_familys_mean_has_that_size(factor: 
     assert found.size.whole == factor
     place = found.view.normal.blocks["bend"].start
     assert found.explained()[place] == pytest.approx(1.5 * factor, abs=1e-3)
-
-
-def test_an_effect_that_is_there_moves_from_zero_and_not_from_what_its_family_shows() -> None:
-    found = shown_always(2.0)
-    assert found.size.whole == 1.0
-    place = found.view.normal.blocks["bend"].start
-    # 300 samples of unit noise against rows of unit size, five standard errors
-    assert found.moved("bend")[place] == pytest.approx(2.0, abs=5.0 / np.sqrt(N))
