@@ -28,7 +28,7 @@ kink: 35 campaigns, docs/theory/inference.md."""
 
 REJECTED = 2.0
 """What the model without further effects leaves, over what noise leaves, from which on its fit need
-not settle: it lacks something strong."""
+not settle: it lacks something strong. Other values: docs/theory/verdict_numbers.md."""
 
 
 class Hypotheses:

@@ -132,7 +132,7 @@ class Posterior:
 
     @property
     def gage(self) -> frozenset[str]:
-        """Names of the effects at the gage, of the model or beside it."""
+        """Names of all effects that act at the gage, whether the model has them or not."""
         return frozenset(e.name for e in self.point.effects if e.hook == "gage")
 
     def strength(self, name: str) -> FloatArray | None:

@@ -15,7 +15,7 @@ SIZES = 2.0 ** np.arange(-2, 2)
 tire that leaves little shows a weak effect; one that leaves far more than its family has something
 unknown, so that twice as much is the most that is excused."""
 APART = (0.5, 1.0, 2.0)
-"""Ratios of what one tire shows beside the contact to what it shows in the contact. A tire that
+"""How many times as large a tire's size may be beside the contact as in the contact. A tire that
 leaves little in the contact may leave as much as others beside it, which is no fault."""
 SIZE_STD = 1.5
 """Standard deviation of the logarithm of this size."""
