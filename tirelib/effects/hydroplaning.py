@@ -10,8 +10,8 @@ WATER = 1000.0
 """Density, [kg/m^3]."""
 DEPTH = 0.001
 """Depth of the water, [m]: the middle of what UN Regulation 117 allows where it measures wet grip.
-With half or double of this depth the law is no further off on simulated tires:
-docs/theory/verdict_numbers.md."""
+On simulated tires the law is off by up to twice as much with half of this depth, and by no more
+with double: docs/theory/verdict_numbers.md."""
 
 
 @effect(

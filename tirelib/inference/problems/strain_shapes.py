@@ -24,7 +24,8 @@ NEIGHBOURS = 2.0
 correlation of bumps that are n apart. There the belt is loaded by nothing and bends in waves that
 are longer than a bump. Half and double of it: docs/theory/verdict_numbers.md."""
 ALONE = 1e-3
-"""Variance of each bump by itself, over that which it shares with its neighbours."""
+"""Variance of each bump by itself, over that which it shares with its neighbours: it keeps the
+correlations positive definite. Half and double of it: docs/theory/verdict_numbers.md."""
 GOES_WITH = ("constant", "load", "pressure", "speed")
 
 

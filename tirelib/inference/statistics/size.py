@@ -18,7 +18,8 @@ APART = (0.5, 1.0, 2.0)
 """How many times as large a tire's size may be beside the contact as in the contact. A tire that
 leaves little in the contact may leave as much as others beside it, which is no fault."""
 SIZE_STD = 1.5
-"""Standard deviation of the logarithm of this size."""
+"""Standard deviation of the logarithm of this size. Half and double of it:
+docs/theory/verdict_numbers.md."""
 LARGEST = 2.0
 """Most by which one tire shows more of everything than its family."""
 
