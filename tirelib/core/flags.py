@@ -1,6 +1,7 @@
 """Flags of a turn: its faults, and whether it may still be used."""
 
 from enum import IntFlag
+from functools import lru_cache
 
 
 class TurnFlag(IntFlag):
@@ -84,4 +85,10 @@ def flag_names(value: int) -> list[str]:
     >>> flag_names(TurnFlag.SPIKE | TurnFlag.FIRST_TURN)
     ['first_turn', 'spike']
     """
-    return [flag.name.lower() for flag in TurnFlag if flag & value and flag.name]
+    return list(_names(int(value)))
+
+
+@lru_cache(maxsize=1024)
+def _names(value: int) -> tuple[str, ...]:
+    """Return them; at every step of a stream they are asked for, and seldom others."""
+    return tuple(flag.name.lower() for flag in TurnFlag if flag & value and flag.name)

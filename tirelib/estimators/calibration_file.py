@@ -94,6 +94,14 @@ def read_calibration(path: str | Path) -> Calibration:
     FormatError
         If the file is no calibration of a known version, or a part is missing or of a wrong type.
     """
+    return read_with_provenance(path)[0]
+
+
+def read_with_provenance(path: str | Path) -> tuple[Calibration, dict[str, Any]]:
+    """Read a calibration and the whole document, which tells what it was made on; see the above.
+
+    Reading the text takes most of the time.
+    """
     where = str(path)
     try:
         document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
@@ -127,7 +135,7 @@ def read_calibration(path: str | Path) -> Calibration:
         ) from None
     if -1 not in calibration.chains:
         raise FormatError(f"{where}: holds no chain for all gages; calibrate anew")
-    return calibration
+    return calibration, document
 
 
 def _calibration(document: Mapping[str, Any]) -> Calibration:

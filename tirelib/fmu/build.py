@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tirelib.core.errors import FormatError, ParameterError
 from tirelib.estimators.calibration import Calibration
-from tirelib.estimators.calibration_file import read_calibration
+from tirelib.estimators.calibration_file import read_calibration, read_with_provenance
 from tirelib.estimators.core_table import flat_table
 from tirelib.fmu.export import export
 from tirelib.fmu.native import pack
@@ -76,10 +76,11 @@ def build_fmu(
             f"fmu build: FMI {fmi}{' with --python' if python else ''}; allowed are 2, and 3 "
             "without --python; leave one of the options out"
         )
-    loaded = read_calibration(calibration)
+    loaded, document = read_with_provenance(calibration)
     spec = strain_tire(
         loaded,
         Path(calibration).read_text(encoding="utf-8"),
+        document,
         samples_per_step=samples_per_step,
         sample_rate=sample_rate,
         buffered=buffered,

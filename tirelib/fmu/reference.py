@@ -69,15 +69,21 @@ class Reference:
 
 def _csv(columns: Mapping[str, FloatArray]) -> bytes:
     head = ",".join(f'"{name}"' for name in columns)
-    rows = (",".join(map(_text, row)) for row in zip(*columns.values(), strict=True))
+    rows = map(",".join, zip(*map(_texts, columns.values()), strict=True))
     return "\n".join((head, *rows, "")).encode()
 
 
-def _text(value: FloatArray | float) -> str:
-    """Return the shortest text that reads back as the same number; several part at spaces."""
-    if isinstance(value, np.ndarray):
-        return " ".join(map(_text, value.tolist()))
-    number = float(value)
+def _texts(values: FloatArray) -> list[str]:
+    """Return a text for each row; several numbers of a row part at spaces."""
+    if values.ndim > 1:
+        return list(map(" ".join, zip(*map(_texts, values.T), strict=True)))
+    numbers = values.tolist()
+    known = {number: _text(number) for number in set(numbers)}  # most come again and again
+    return [known[number] for number in numbers]
+
+
+def _text(number: float) -> str:
+    """Return the shortest text that reads back as the same number."""
     return str(int(number)) if math.isfinite(number) and number == int(number) else repr(number)
 
 

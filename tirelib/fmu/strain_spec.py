@@ -1,7 +1,6 @@
 """What ``StrainTire.fmu`` consists of: a calibration, the slave, reference signals, its page."""
 
 import math
-import tomllib
 from collections.abc import Mapping
 from typing import Any
 
@@ -38,6 +37,7 @@ _SHOWN = {
 def strain_tire(
     loaded: Calibration,
     text: str,
+    document: Mapping[str, Any],
     *,
     samples_per_step: int,
     sample_rate: float,
@@ -54,6 +54,8 @@ def strain_tire(
     loaded : Calibration
     text : str
         The calibration's file.
+    document : mapping
+        What stands in it.
 
     Raises
     ------
@@ -78,9 +80,7 @@ def strain_tire(
             loaded, sample_rate, samples_per_step, buffered=buffered, lose=fmi == 2
         )
         reference = (signals.joined(JOINED) if fmi == 3 else signals).files(MODEL)
-    document = tomllib.loads(text)
-    if sealed:
-        document.pop("data", None)
+    told = {name: part for name, part in document.items() if name != "data" or not sealed}
     settings: dict[str, int | float | str | bool] = {
         "samples_per_step": samples_per_step,
         "sample_rate": sample_rate,
@@ -102,7 +102,7 @@ def strain_tire(
             **({} if sealed else {CALIBRATION: text.encode()}),
             **{f"{FOLDER}/{name}": data for name, data in reference.items()},
         },
-        documentation={"index.html": _page(loaded, document, shown, settings).encode()},
+        documentation={"index.html": _page(loaded, told, shown, settings).encode()},
         icon=source_file("strain_tire.png").read_bytes(),
         start_depends_on=(MISSING,),
         fmi=fmi,
