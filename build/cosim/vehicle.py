@@ -43,6 +43,8 @@ PLY_STEER = ("p_hy1", "p_vy1")
 """Tire parameters that are set to zero: the model gives them the sign of the camber, so that the
 lateral force jumps where the camber passes zero, and a vehicle that rolls straight never rests."""
 _LATERAL, _SLIP = sign("Fy", "sae"), sign("slip_angle", "sae")
+_SETTLED: dict[tuple[int, float], FloatArray] = {}
+"""States at rest by vehicle and speed: rolling to rest takes as long as a short manoeuvre."""
 
 
 class _Opened(ast.NodeTransformer):
@@ -171,17 +173,21 @@ class Vehicle:
         self._tire = vars(parameters.tire) | dict.fromkeys(PLY_STEER, 0.0)
         self.mass = float(parameters.m)
         self._rub(Controls())
-        self.state = np.array(init_mb([0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0], parameters))
-        self._settle(speed)
-
-    def _settle(self, speed: float) -> None:
-        """Roll straight until the springs rest: the package's first state is not quite at rest."""
         self.time = 0.0
+        if (number, speed) not in _SETTLED:
+            self.state = np.array(init_mb([0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0], parameters))
+            _SETTLED[number, speed] = self._settled(speed)
+        self.state = _SETTLED[number, speed].copy()
+
+    def _settled(self, speed: float) -> FloatArray:
+        """Roll straight until the springs rest: the package's first state is not quite at rest."""
         for _ in range(round(SETTLING / 2e-3)):
             self.step(2e-3, Controls())
-        self.state[[0, 1, _YAW]], self.state[_SPEED] = 0.0, speed
-        self.state[_SPIN] = speed / self.parameters.R_w
         self.time = 0.0
+        state = self.state
+        state[[0, 1, _YAW]], state[_SPEED] = 0.0, speed
+        state[_SPIN] = speed / self.parameters.R_w
+        return state
 
     def _rub(self, controls: Controls) -> None:
         """Set the friction under each wheel."""

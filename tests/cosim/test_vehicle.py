@@ -155,6 +155,16 @@ def test_every_manoeuvre_stays_within_the_virtual_tire() -> None:
     assert INPUTS[0] == "Fz"
 
 
+def test_every_vehicle_starts_at_its_own_speed_whatever_another_did() -> None:
+    before = Vehicle(VEHICLE, 20.0).state.copy()
+    driven = Vehicle(VEHICLE, 20.0)
+    driven.state += 1.0
+    np.testing.assert_array_equal(Vehicle(VEHICLE, 20.0).state, before)
+    faster = Vehicle(VEHICLE, 25.0)
+    assert faster.look().speed == 25.0
+    assert faster.time == 0.0
+
+
 def test_an_unknown_parameter_set_is_refused() -> None:
     with pytest.raises(ParameterError, match="vehicle 4; allowed are 1 to 3"):
         Vehicle(4, 20.0)
