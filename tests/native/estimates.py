@@ -4,7 +4,7 @@ import ctypes as c
 
 import numpy as np
 
-from tests.native.core import BY_GAGE, SCALARS, NativeFeatures, NativeTurn
+from tests.native.core import BY_GAGE, SCALARS, NativeFeatures, NativeTurn, close
 from tirelib.core.compiled import EstimateStruct
 from tirelib.estimators.calibration import Calibration
 from tirelib.estimators.compiled import NOTES, ROLLING
@@ -65,11 +65,7 @@ def assert_same_estimates(got: NativeEstimates, wanted: Estimates, row: int) -> 
     for index, name in enumerate(QUANTITIES):
         assert bool(got.valid[index]) == wanted.valid[name][row], name
         for kind in ("value", "std"):
-            close(getattr(got, kind)[index], getattr(wanted, kind)[name][row], SIZE[name], name)
-    close(got.radius, wanted.radius[row], 0.1, "radius")
+            close(name, getattr(got, kind)[index], getattr(wanted, kind)[name][row], SIZE[name])
+    close("radius", got.radius, wanted.radius[row], 0.1)
     for name in ("contact_length", "contact_length_std"):
-        close(getattr(got, name)[:gages], getattr(wanted, name)[row], 0.1, name)
-
-
-def close(got: object, wanted: object, size: float, name: str) -> None:
-    np.testing.assert_allclose(got, wanted, rtol=1e-9, atol=1e-9 * size, err_msg=name)
+        close(name, getattr(got, name)[:gages], getattr(wanted, name)[row], 0.1)
