@@ -29,7 +29,7 @@ from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE
 from tirelib.inference.identify.campaign_data import straight_runs
 from tirelib.inference.problems.strain import StrainProblem
-from tirelib.inference.statistics.law_errors import Errors, beyond_base, law_errors
+from tirelib.inference.statistics.law_errors import Errors, law_errors
 from tirelib.inference.statistics.null import OWN, Null
 from tirelib.inference.statistics.plain import BASE, Family, load, pooled
 from tirelib.inference.statistics.posterior import Posterior, posterior, sizes_at_start
@@ -89,10 +89,13 @@ def likelihoods(file: Path, others: list[Family]) -> tuple[np.ndarray, np.ndarra
     best = [likeliest(fit, views, others, law) for law in LAW]
     by_law = np.array([null.likelihood for null in best])
     null, laws = best[by_law.argmax()], (LAW[by_law.argmax()],)
-    done, alike = beyond_base(fit, laws, null.view)
+    beside = {effect.name: fit.seen[effect.name] for effect in fit.point.effects[1:]}
+    done = fit.seen[fit.names[0]]
     exact = Errors(laws, 0.0)
     by_share = np.zeros(len(SHARE))
-    for name, other in alike.items():
+    for name, other in beside.items():
+        if not other:
+            continue
         for k, share in enumerate(SHARE):
             allowed = {name: share**2 * done / other}
             by_share[k] += null_at(fit, null.view, null.family, exact, allowed).likelihood
@@ -136,7 +139,7 @@ def null_at(
     more: Mapping[str, float | np.ndarray],
 ) -> Null:
     """Return the test of a fit whose law is off by so much, with more variances by block."""
-    allowed = {BASE: fit.widths**2, **law_errors(fit, errors, view), **more}
+    allowed = {BASE: fit.widths**2, **law_errors(fit, errors), **more}
     return Null(view, family, family.spread(fit.sizes), allowed, fit.sides, fit.gage)
 
 

@@ -347,7 +347,7 @@ def _without_smooth(
 ) -> float:
     """Return the error with a smooth misfit taken out."""
     half = 0.5 * (prediction.edges[:, 1] - prediction.edges[:, 0])
-    shapes = Discrepancy().columns(prediction.strain, half, points, GRID)
+    shapes = Discrepancy().columns(prediction.strain, GRID / half[:, None], points)
     rows = whiten(shapes).reshape(len(shapes), -1)
     white = whiten(rest).ravel()
     normal = rows @ rows.T + np.eye(len(rows))

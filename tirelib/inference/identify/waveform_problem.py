@@ -164,7 +164,7 @@ class WaveformProblem:
         if self.discrepancy is None:
             return np.zeros((0, *waveform.shape))
         half = 0.6 * np.sqrt(2.0 * depth / float(np.max(self.values["free_radius"])))
-        return self.discrepancy.columns(waveform, half, points, GRID)
+        return self.discrepancy.columns(waveform, GRID / half[:, None], points)
 
     def roughly(
         self, point: Point, solved: WaveformSolved, slopes: FloatArray, count: int

@@ -11,6 +11,8 @@ from tirelib.inference.identify.discrepancy import (
     REFERENCE_LOAD,
     REFERENCE_OMEGA,
     REFERENCE_PRESSURE,
+    TOP,
+    along_turn,
     bumps,
 )
 from tirelib.measured.waveforms import GRID
@@ -71,9 +73,7 @@ def law_errors(
     square = np.sum(rows**2, axis=0)
     mean = np.mean(square, axis=1, keepdims=True)
     size = np.sqrt(0.5 * mean + 0.5 * _nearby(square, half_angle))
-    shape = (
-        bumps(GRID / half_angle[:, None], KNOTS, float(np.pi / half_angle[:present].mean())) * size
-    )
+    shape = bumps(along_turn(GRID, half_angle), KNOTS, TOP) * size
     shape = SHAPED * (shape - shape.mean(axis=2, keepdims=True))
     by_load = shape * conditions[0, :, None]
     by_speed = SHAPED_BY_SPEED / SHAPED * shape * conditions[1, :, None]

@@ -8,16 +8,16 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.effects.state import Operating
-from tirelib.inference.identify.discrepancy import Discrepancy
+from tirelib.inference.identify.discrepancy import TOP, Discrepancy, along_turn
 from tirelib.inference.problems.whiten_strain import INSIDE
 from tirelib.measured.waveforms import GRID
 
 SHAPES = Discrepancy(
-    inside=1.0, outside=0.15, knots=38, reach=20.0, by_load=1.0, by_pressure=1.0, by_speed=1.0
+    inside=1.0, outside=0.15, knots=38, reach=TOP, by_load=1.0, by_pressure=1.0, by_speed=1.0
 )
-"""Smooth shapes over the wheel angle, to the top of a tire whose contact is 18 deg long."""
+"""Smooth shapes over the whole turn."""
 BESIDE = 5.0
-"""Half contact angles up to which the contact bends the belt; beyond, the belt is nearly round.
+"""Place along the turn up to which the contact bends the belt; beyond, the belt is nearly round.
 Half and double of it: docs/theory/verdict_numbers.md."""
 NEIGHBOURS = 2.0
 """Bumps over which shapes far away from the contact go together: exp(-n^2 / 2 NEIGHBOURS^2) is the
@@ -46,7 +46,7 @@ def smooth_shapes(
     -------
     mapping of "load, free belt" and the like to shape (n_bumps, n_runs, n_phi)
     """
-    columns = SHAPES.columns(waveform, half_angle, points, GRID)
+    columns = SHAPES.columns(waveform, along_turn(GRID, half_angle), points)
     end = np.arcsinh(SHAPES.reach)
     centre = np.sinh(np.linspace(-end, end, SHAPES.knots))
     place = np.digitize(np.abs(centre), (INSIDE, BESIDE))

@@ -5,7 +5,7 @@
 N is the noise of a mean waveform: white before the low-pass, so that its power falls with the
 filter's gain. T_i are the slopes by load, pressure, gain and angle zero, S the rig's tolerances.
 The last part is a misfit of this run alone, in proportion to the run's strain and correlated over
-the wheel angle in units of the half contact angle (Matern's function of order 3/2, whose spectrum
+the place along the turn (Matern's function of order 3/2, whose spectrum
 falls slowly: the ends of a contact are sharp): what no two runs share cannot be learned from
 them, and without it thousands of samples would be certain of some tens of numbers.
 
@@ -19,15 +19,16 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray
 from tirelib.effects.state import Operating
+from tirelib.inference.identify.discrepancy import along_turn
 from tirelib.measured.signal import LowPass
 from tirelib.measured.waveforms import GRID
 
 GAIN = 0.1
 """Gain of the low-pass, in power, below which a harmonic holds nothing."""
 LENGTH = 0.25
-"""Length over which a run's own misfit is correlated, in arcsinh of half contact angles."""
+"""Length over which a run's own misfit is correlated, in arcsinh of the place along the turn."""
 INSIDE = 1.5
-"""Half contact angles up to which tread and road have to do with the misfit."""
+"""Place along the turn up to which tread and road have to do with the misfit."""
 OUTSIDE = 0.15
 """Its size away from the contact, over that within."""
 FLOOR = 1e-3
@@ -94,9 +95,10 @@ class Whitener:
         power = gain / np.sum(gain, axis=1, keepdims=True) * 0.5 * GRID.size
         power *= np.broadcast_to(noise, len(points))[:, None] ** 2
         power = np.maximum(power, FLOOR * power.max(axis=1, keepdims=True))
-        scaled = np.arcsinh(GRID / half_angle[:, None])
+        along = along_turn(GRID, half_angle)
+        scaled = np.arcsinh(along)
         size = np.sqrt(np.mean(waveform**2, axis=1))
-        share = OUTSIDE + (1.0 - OUTSIDE) * np.exp(-((GRID / half_angle[:, None] / INSIDE) ** 4))
+        share = OUTSIDE + (1.0 - OUTSIDE) * np.exp(-((along / INSIDE) ** 4))
         amount = own * size[:, None] * share
         covariance = np.zeros((len(points), 2 * order.size, 2 * order.size))
         for run, (place, much) in enumerate(zip(scaled, amount, strict=True)):

@@ -221,7 +221,7 @@ def _calibrated(nulls: Sequence[Null], fit: Posterior, errors: Errors) -> tuple[
     """Return the statistics of plain tires by the other families; tests learn what is usual."""
     plain, view = [], nulls[0].view
     for family in (null.family for null in nulls):
-        planted, noise = _drawn(fit, family, law_errors(fit, errors, view), view.white.shape[1])
+        planted, noise = _drawn(fit, family, law_errors(fit, errors), view.white.shape[1])
         turned = _products(view, noise + planted @ view.white)  # whitened
         plain.append([null.scores_of(turned) for null in nulls if null.family is not family])
     every = np.concatenate([scores for each in plain for scores in each], axis=1)

@@ -8,8 +8,6 @@ other effects is allowed for, or it is not, whichever is likelier.
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from tirelib.core.arrays import FloatArray
 from tirelib.inference.statistics.null import PRIOR, Null
 from tirelib.inference.statistics.plain import BASE, ROUGHLY, Family
@@ -148,46 +146,20 @@ def null_of(
     """Return the test of a fit by a family, its laws off by so much; as `Null`."""
     wide = fit.widths**2
     wide[len(fit.point.base) :] *= PRIOR**2
-    allowed = {BASE: wide, **law_errors(fit, errors, view)}
+    allowed = {BASE: wide, **law_errors(fit, errors)}
     return Null(view, family, family.spread(fit.sizes), allowed, fit.sides, fit.gage, size)
 
 
-def law_errors(fit: Posterior, errors: Errors, view: View) -> dict[str, float | FloatArray]:
+def law_errors(fit: Posterior, errors: Errors) -> dict[str, float | FloatArray]:
     """Return variances by block where the laws are off by so much.
 
     They come on top of what plain tires show. A law's error has shapes of its own. To some extent
-    it may look like each other effect: by a share of what the laws do that the base cannot take.
-    Exact laws have no error.
+    it may look like each other effect: by a share of what the laws do, as far as neither the base
+    nor what plain tires show can take it. Exact laws have no error.
     """
-    out: dict[str, float | FloatArray] = {
-        ROUGHLY + effect.name: law**2
-        for effect, law in zip(fit.effects, errors.laws, strict=True)
-        if law
-    }
-    if out and errors.lookalike:
-        square, others = beyond_base(fit, errors.laws, view)
-        out |= {name: errors.lookalike**2 * square / other for name, other in others.items()}
-    return out
-
-
-def beyond_base(
-    fit: Posterior, laws: Sequence[float], view: View
-) -> tuple[float, dict[str, float]]:
-    """Return the square of what rough laws do that the base cannot take, and of others' rows.
-
-    The rows of other effects are of a strength of one range; an effect of which the base takes all
-    is left out.
-    """
-    gram, first = view.normal.gram, len(fit.point.base)
-    base = gram[:first, :first] + np.diag(fit.widths[:first] ** -2)
-    left = gram - gram[:, :first] @ np.linalg.solve(base, gram[:first])
-    done = 0.0
-    for law, size in zip(laws, fit.point.ranges, strict=False):
-        own = slice(first, first + len(size))
-        done += float(size @ left[own, own] @ size) if law else 0.0
-        first = own.stop
-    others = {
-        effect.name: float(np.mean(np.diag(left)[view.normal.blocks[effect.name]]))
-        for effect in fit.point.effects[fit.count :]
-    }
-    return done, {k: v for k, v in others.items() if v > 0.0}
+    laws = dict(zip(fit.names, errors.laws, strict=True))
+    laws = {name: law for name, law in laws.items() if law}
+    done = errors.lookalike**2 * sum(fit.seen[name] for name in laws)
+    others = (effect.name for effect in fit.point.effects[fit.count :])
+    out: dict[str, float | FloatArray] = {ROUGHLY + name: law**2 for name, law in laws.items()}
+    return out | {name: done / fit.seen[name] for name in others if done and fit.seen[name] > 0.0}

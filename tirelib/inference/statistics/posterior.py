@@ -84,6 +84,10 @@ class Posterior:
         By how much J may fall further.
     far : bool
         Whether the model leaves more than `FAR` of what noise leaves.
+    seen : mapping of effect to float
+        Squares of what effects do that neither the base nor shapes of plain tires can take, in
+        units of the noise: of the model's effects as strong as they are, of others by the number,
+        one range strong.
     lookalike : float
         How much of what a law does may be an error that looks like any one other effect.
     """
@@ -98,6 +102,7 @@ class Posterior:
     cost: float
     short: float
     far: bool
+    seen: Mapping[str, float]
     lookalike: float
 
     @property
@@ -293,6 +298,7 @@ def posterior(
         cost,
         little,
         bool(cost > FAR * rest.size),
+        _seen(normal, point, width[:count], spread, len(effects)),
         problem.lookalike,
     )
 
@@ -325,6 +331,25 @@ def explaining(
         if not effect.exact:
             every[ROUGHLY + effect.name] = errors
     return every, slopes
+
+
+def _seen(
+    normal: Normal, point: Point, widths: FloatArray, spread: Spread, count: int
+) -> dict[str, float]:
+    """Return `Posterior.seen` of a point whose first `count` effects are the model's."""
+    first, own = len(point.base), point.effects[:count]
+    shapes = {name: variance for name, variance in spread.items() if "," in name}
+    variance = normal.spread(shapes)
+    variance[:first] = widths[:first] ** 2
+    gram = Weighed(normal, variance).gram
+    out = {}
+    for effect, size in zip(own, point.ranges, strict=False):
+        rows = slice(first, first + len(size))
+        out[effect.name], first = float(size @ gram[rows, rows] @ size), rows.stop
+    return out | {
+        effect.name: float(np.mean(np.diag(gram)[normal.blocks[effect.name]]))
+        for effect in point.effects[count:]
+    }
 
 
 def sizes_at_start(problem: Model) -> dict[str, float]:

@@ -30,7 +30,7 @@ def p_against(problem: Problem, hypothesis: Hypothesis, rival: Hypothesis) -> fl
     fit = hypothesis.fit
     modelled = fit.rest - np.tensordot(_coordinates(fit), fit.rows[BASE], axes=1)
     view = hypothesis.null.view
-    laws, own = law_errors(fit, hypothesis.errors, view), view.own
+    laws, own = law_errors(fit, hypothesis.errors), view.own
     p = [float(np.exp(-ratio))]
     for family in (null.family for null in hypothesis.nulls):
         # what is measured where the hypothesis is true, less what is measured; first nothing

@@ -5,6 +5,7 @@ import pytest
 
 from tests.unit.inference.identify.model_waves import operating
 from tirelib.core.arrays import FloatArray
+from tirelib.inference.identify.discrepancy import TOP, along_turn
 from tirelib.inference.problems.strain_shapes import GOES_WITH, NEIGHBOURS, SHAPES, smooth_shapes
 from tirelib.measured.waveforms import GRID
 
@@ -19,7 +20,29 @@ def groups() -> dict[str, FloatArray]:
 
 def columns() -> FloatArray:
     waveform = 1e-3 * np.cos(GRID) * np.ones((2, 1))
-    return SHAPES.columns(waveform, HALF_ANGLE, POINTS, GRID)
+    return SHAPES.columns(waveform, along_turn(GRID, HALF_ANGLE), POINTS)
+
+
+def test_the_place_along_the_turn_goes_from_edge_to_top_at_every_load() -> None:
+    half = np.array([0.08, 0.16, 0.4])
+    at = np.stack([-np.pi * np.ones(3), -half, 0.3 * half, half, np.pi * np.ones(3)], axis=1)
+    place = np.concatenate([along_turn(at[k], half[k : k + 1]) for k in range(3)])
+    assert place == pytest.approx(np.array([-TOP, -1.0, 0.3, 1.0, TOP]) * np.ones((3, 1)))
+    turn = along_turn(GRID, half)
+    assert (np.diff(turn, axis=1) > 0.0).all()
+    # where the contact is as long as that of the unit, the place is in half contact angles
+    usual = np.array([np.pi / TOP])
+    assert along_turn(GRID, usual) == pytest.approx(GRID[None] / usual[:, None])
+
+
+def test_what_is_at_the_top_at_every_load_is_constant() -> None:
+    wave = 1e-3 * np.exp(-0.5 * ((np.abs(GRID) - 2.6) / 0.5) ** 2) * np.ones((2, 1))
+    wave -= wave.mean(axis=1, keepdims=True)
+    shapes = groups()["constant, far belt"].reshape(14, -1)
+    mix, *_ = np.linalg.lstsq(shapes.T, wave.ravel(), rcond=1e-9)
+    left = (wave.ravel() - mix @ shapes).reshape(wave.shape)
+    far = np.abs(GRID) > 1.5
+    assert np.abs(left[:, far]).max() < 0.05 * wave.max()
 
 
 def test_every_bump_is_in_one_group() -> None:

@@ -34,21 +34,20 @@ def test_a_law_may_look_like_another_effect_where_that_is_likelier(
 
 def test_an_exact_law_looks_like_nothing_else() -> None:
     found, likelihoods, _ = hypothesis(planted(5, twist=1.0), "twist")
-    view = found.null.view
-    assert law_errors(found.fit, likelihoods.exact, view) == {}
+    assert law_errors(found.fit, likelihoods.exact) == {}
     one = likelihoods.alike[0].but(0, 0.0, found.fit.lookalike)
-    assert law_errors(found.fit, one, view) == {}
+    assert law_errors(found.fit, one) == {}
 
 
 def test_what_looks_like_another_effect_goes_with_what_the_rough_laws_do() -> None:
     found, likelihoods, _ = hypothesis(planted(5, twist=1.0, swell=1.0), "twist", "swell")
-    view, share = found.null.view, found.fit.lookalike
+    share = found.fit.lookalike
     both = likelihoods.loosest
-    whole = float(law_errors(found.fit, both, view)["bend"])
-    parts = [float(law_errors(found.fit, both.but(k, 0.0, share), view)["bend"]) for k in range(2)]
+    whole = float(law_errors(found.fit, both)["bend"])
+    parts = [float(law_errors(found.fit, both.but(k, 0.0, share))["bend"]) for k in range(2)]
     assert sum(parts) == pytest.approx(whole)
     assert min(parts) > 0.1 * whole
-    double = law_errors(found.fit, both._replace(lookalike=2.0 * share), view)["bend"]
+    double = law_errors(found.fit, both._replace(lookalike=2.0 * share))["bend"]
     assert double == pytest.approx(4.0 * whole)
 
 
