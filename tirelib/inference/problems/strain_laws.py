@@ -11,16 +11,16 @@ from tirelib.inference.identify.discrepancy import (
     REFERENCE_LOAD,
     REFERENCE_OMEGA,
     REFERENCE_PRESSURE,
-    TOP,
     along_turn,
     bumps,
 )
+from tirelib.inference.problems.strain_shapes import SHAPES
 from tirelib.measured.waveforms import GRID
 from tirelib.model.base import Coordinate
 
-KNOTS = 32
-"""Bumps of an error's shape round the whole turn: what a sidewall or a heavy spot does, and gets
-wrong, ends nowhere."""
+ANYWHERE = 0.1
+"""Share of the power of an error's smooth shapes that lies anywhere on the turn; the rest lies
+where the effect acts. Half and double of it: docs/theory/verdict_numbers.md."""
 SHARED = 5.0
 """Size of an error by which another constant of the same part of the tire goes with the effect."""
 PARTS = {"k_u": "sidewall", "k_v": "sidewall", "k_t": "tread"}
@@ -72,8 +72,8 @@ def law_errors(
     otherwise = GOES * (goes[:, None, :, None] * rows[None]).reshape(-1, *rows.shape[1:])
     square = np.sum(rows**2, axis=0)
     mean = np.mean(square, axis=1, keepdims=True)
-    size = np.sqrt(0.5 * mean + 0.5 * _nearby(square, half_angle))
-    shape = bumps(along_turn(GRID, half_angle), KNOTS, TOP) * size
+    size = np.sqrt(ANYWHERE * mean + (1.0 - ANYWHERE) * _nearby(square, half_angle))
+    shape = bumps(along_turn(GRID, half_angle), SHAPES.knots, SHAPES.reach) * size
     shape = SHAPED * (shape - shape.mean(axis=2, keepdims=True))
     by_load = shape * conditions[0, :, None]
     by_speed = SHAPED_BY_SPEED / SHAPED * shape * conditions[1, :, None]
