@@ -13,6 +13,7 @@ from tirelib.core.arrays import BoolArray
 from tirelib.effects import CATALOGUE
 from tirelib.inference.compare.error import Yardstick, error_of
 from tirelib.inference.compare.model import TireModel, model_of
+from tirelib.inference.diagnose import strain_models
 from tirelib.inference.diagnose.diagnose import plain_tires
 from tirelib.inference.diagnose.document import next_test
 from tirelib.inference.diagnose.held_out import pooled, strain_folds
@@ -101,8 +102,10 @@ def test_held_out_errors_are_of_runs_that_the_fit_has_not_seen(
     assert error.value > 10.0 * spoiled.take(~load.out).error(plain.model, 0.0).value
 
 
-def test_what_is_held_out_moves_no_number(plain: Fitted) -> None:
+def test_what_is_held_out_moves_no_number(plain: Fitted, monkeypatch: pytest.MonkeyPatch) -> None:
     """Spoiled runs that are left out change nothing; the same runs in the fit do."""
+    # errors alone need no more than a rough fit, which depends on where it starts
+    monkeypatch.setattr(strain_models, "ROUGH", 1e-3)
     load, _ = strain_folds(runs().data())
     strain = runs().strain + 1e-4 * load.out[:, None] * np.cos(3.0 * GRID)
     spoiled = base_of(replace(runs(), strain=strain))
