@@ -142,15 +142,14 @@ class Hypotheses:
     def may_reject(self, hypothesis: Hypothesis, name: str) -> bool:
         """Return whether this effect beside a hypothesis promises enough to reject it.
 
-        See `against_larger`. What it promises to first order is with laws that are exact, or with
-        the hypothesis' own.
+        See `against_larger`. What it promises to first order is with laws that are exact, or as
+        they are likeliest; where they may look like the further effect, also without that.
         """
         odds = np.log(self._count(hypothesis) / self.false_alarm)
-        rough = max(null.gained[name] for null in hypothesis.nulls)
-        without = max(null.likelihood for null in hypothesis.nulls)
-        gains = hypothesis.further[name] - hypothesis.exact, rough - without
-        behind = hypothesis.likelihood - hypothesis.exact, 0.0
-        return any(KINKED * gain >= odds + less for gain, less in zip(gains, behind, strict=True))
+        return any(
+            KINKED * (gained[name] - own) >= odds + hypothesis.likelihood - own
+            for own, gained in hypothesis.promises
+        )
 
     def _p_beside(self, hypothesis: Hypothesis, larger: Hypothesis, further: int) -> float:
         """Return the p-value of a hypothesis against one effect more, as in `against_larger`."""

@@ -52,10 +52,9 @@ class Hypothesis:
     likelihood : float
         Largest log likelihood over the families and over how far the laws are off, laws that are
         exact among them, [nats].
-    exact : float
-        Largest log likelihood with exact laws, [nats].
-    further : mapping of name to float
-        The same with each further effect, to first order, [nats].
+    promises : tuple of (float, mapping of name to float)
+        Largest log likelihood, and the same with each further effect to first order, [nats]: with
+        exact laws, with laws as they are likeliest but not like other effects, and as likeliest.
     unnamed : float
         Largest log likelihood where a cause without a name acts as well, [nats]. This cause is more
         of a group of smooth shapes than plain tires have. Laws are roughly right, or exact.
@@ -79,8 +78,7 @@ class Hypothesis:
     looseness: float
     plausible: bool
     likelihood: float
-    exact: float
-    further: Mapping[str, float]
+    promises: tuple[tuple[float, Mapping[str, float]], ...]
     unnamed: float
     exact_in: tuple[float, ...]
     exact_plain: tuple[float, ...]
@@ -92,6 +90,16 @@ class Hypothesis:
     def names(self) -> tuple[str, ...]:
         """Names of the effects."""
         return self.fit.names
+
+    @property
+    def exact(self) -> float:
+        """Largest log likelihood with exact laws, [nats]."""
+        return self.promises[0][0]
+
+    @property
+    def further(self) -> Mapping[str, float]:
+        """The same with each further effect, to first order, [nats]."""
+        return self.promises[0][1]
 
     @property
     def null(self) -> Null:
@@ -188,16 +196,14 @@ def judged(
         if stays:
             looseness = max((*each.laws, LAWS[-1])) / LAWS[-1]
             break
-    sharp = likelihoods.nulls(exact)
-    further = {name: max(null.gained[name] for null in sharp) for name in sharp[0].gained}
+    sharp, alone = likelihoods.nulls(exact), likeliest._replace(lookalike=0.0)
     return Hypothesis(
         fit,
         *kept,
         looseness,
         plausible(fit, own_effects),
         likelihoods.of(likeliest),
-        likelihoods.of(exact),
-        further,
+        tuple((likelihoods.of(e), likelihoods.gained(e)) for e in (exact, alone, likeliest)),
         max(likelihoods.unnamed(each) for each in (likeliest, exact)),
         tuple(likelihoods.exact_in(k) for k in range(len(fit.effects))),
         tuple(_p_plain(sharp, fit, k) for k in range(len(fit.effects))),

@@ -84,6 +84,11 @@ class Likelihoods:
         """Return the largest log likelihood, [nats]."""
         return _largest(self.nulls(errors))
 
+    def gained(self, errors: Errors) -> dict[str, float]:
+        """Return the largest log likelihood with each further effect, to first order, [nats]."""
+        nulls = self.nulls(errors)
+        return {name: max(null.gained[name] for null in nulls) for name in nulls[0].gained}
+
     def unnamed(self, errors: Errors) -> float:
         """Return the log likelihood where something without a name acts as well, [nats]."""
         return max(null.unnamed for null in self.nulls(errors))

@@ -224,12 +224,10 @@ def _further(leader: Hypothesis, effects: dict[str, Effect], most: int) -> list[
 
 
 def _promising(leader: Hypothesis, names: Sequence[str]) -> set[str]:
-    """Return the effects that gain enough to first order, with exact laws or with the leader's."""
-    exact = {name: leader.further[name] - leader.exact for name in names}
-    before = max(null.likelihood for null in leader.nulls)
-    rough = {name: max(null.gained[name] for null in leader.nulls) - before for name in names}
+    """Return the effects that gain enough to first order, by any of `Hypothesis.promises`."""
     out: set[str] = set()
-    for gains in (exact, rough):
+    for own, gained in leader.promises:
+        gains = {name: gained[name] - own for name in names}
         most = max(gains.values(), default=0.0)
         # where no effect gains anything, each may do so beyond first order
         out |= {name for name, gain in gains.items() if most <= 0.0 or gain >= PROMISED * most}

@@ -10,6 +10,7 @@ from tests.unit.inference.statistics.linear_problem import EFFECTS, N, Toy, by_e
 from tirelib.core.arrays import FloatArray
 from tirelib.inference.statistics import hypotheses
 from tirelib.inference.statistics.hypotheses import Hypotheses
+from tirelib.inference.statistics.hypothesis import Hypothesis
 from tirelib.inference.statistics.law_errors import LAWS
 from tirelib.inference.statistics.problem import Point
 from tirelib.inference.statistics.select import select
@@ -76,6 +77,19 @@ def test_one_effect_more_is_fitted_only_where_it_could_reject_the_hypothesis(
     assert any(len(h.names) > 1 for h in found.tried) is any(worth) is (kinked > 1e3)
 
 
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_a_further_effect_may_promise_enough_where_laws_do_not_look_like_it(share: float) -> None:
+    among = Hypotheses(planted(3, twist=1.0), FAMILIES)
+    alone = among.at(["twist"])
+    assert alone is not None
+    nothing = dict.fromkeys(among.effects, -np.inf)
+    # laws that may look like the further effect cover it; others are 20 nats less likely
+    own = alone.likelihood - 20.0
+    gained = own + share * (np.log(2 / 0.05) + 20.0) / hypotheses.KINKED
+    each = (alone.exact, nothing), (own, {**nothing, "bend": gained}), (alone.likelihood, nothing)
+    assert among.may_reject(replace(alone, promises=each), "bend") is (share > 1.0)
+
+
 @pytest.mark.parametrize("law", [0.0, LAWS[0]])
 def test_a_true_hypothesis_seldom_gives_way_to_one_effect_more(law: float) -> None:
     found = [select(planted(60 + seed, law=law, twist=1.0), FAMILIES).sets for seed in range(8)]
@@ -118,6 +132,12 @@ def test_an_effect_stays_without_which_the_hypothesis_would_be_rejected(
     assert among.without_plain(shown) is not shown
 
 
+def with_exact(hypothesis: Hypothesis, exact: float) -> Hypothesis:
+    """Return a hypothesis whose log likelihood with exact laws is another one."""
+    (_, further), *off = hypothesis.promises
+    return replace(hypothesis, promises=((exact, further), *off))
+
+
 @pytest.mark.parametrize("share", [0.99, 1.01])
 def test_an_effect_counts_only_if_its_exact_law_makes_the_runs_likelier(share: float) -> None:
     among = Hypotheses(planted(3, twist=1.0), FAMILIES)
@@ -128,9 +148,10 @@ def test_an_effect_counts_only_if_its_exact_law_makes_the_runs_likelier(share: f
     # the likelihood ratio is that of one of three effects at five percent
     odds = share * np.log(3 / 0.05)
     # the hypothesis with "bend" alone was not fitted, and "twist" is not weighed
-    assert among.explains(replace(both, exact=alone.exact + odds)) is (share > 1.0)
+    assert among.explains(with_exact(both, alone.exact + odds)) is (share > 1.0)
     # that nothing is missing is rejected already
-    assert among.explains(replace(alone, exact=among.base.exact + share - 1.0)) is (share > 1.0)
+    enough = with_exact(alone, among.base.exact + share - 1.0)
+    assert among.explains(enough) is (share > 1.0)
 
 
 def test_what_explains_nothing_without_effects_that_plain_tires_show_is_not_told(

@@ -406,7 +406,8 @@ def leading(
         gained=gained,
     )
     further = {name: 50.0 + gain for name, gain in exact.items()}
-    return SimpleNamespace(null=null, nulls=(null,), scores=scores, exact=50.0, further=further)
+    promises = (50.0, further), (100.0, gained)
+    return SimpleNamespace(null=null, scores=scores, exact=50.0, further=further, promises=promises)
 
 
 def test_effects_that_stand_out_are_tried_though_all_leave_the_same() -> None:
