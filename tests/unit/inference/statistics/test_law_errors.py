@@ -51,6 +51,24 @@ def test_what_looks_like_another_effect_goes_with_what_the_rough_laws_do() -> No
     assert double == pytest.approx(4.0 * whole)
 
 
+def test_what_is_seen_of_an_effect_is_what_neither_base_nor_shapes_can_take() -> None:
+    found, _, among = hypothesis(planted(5, twist=1.0), "twist")
+    fit, whiten = found.fit, among.problem.whitener(among.own)
+    first = len(fit.point.base)
+    shapes = [name for name in fit.rows if "," in name]
+    assert shapes
+    rows = whiten(np.concatenate([fit.rows["base"][:first], *(fit.rows[k] for k in shapes)]))
+    variance = [fit.widths[:first] ** 2]
+    variance += [np.full(len(fit.rows[name]), among.spread[name]) for name in shapes]
+    inner = np.linalg.inv(rows @ rows.T + np.diag(1.0 / np.concatenate(variance)))
+    (size,) = fit.point.ranges[0]
+    effects = {"twist": size * fit.rows["base"][first], "bend": fit.rows["bend"][0]}
+    for name, effect in effects.items():
+        white = whiten(effect[None])[0]
+        taken = rows @ white
+        assert fit.seen[name] == pytest.approx(white @ white - taken @ inner @ taken, rel=1e-5)
+
+
 def test_the_likeliest_errors_are_as_likely_as_any_others() -> None:
     for law in (0.0, *LAWS):
         _, found, _ = hypothesis(planted(9, law=law, twist=1.0, swell=1.0), "twist", "swell")
