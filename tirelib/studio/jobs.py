@@ -139,7 +139,8 @@ class Jobs:
     def add(self, kind: str, order: Mapping[str, Any], subject: Mapping[str, Any]) -> Job:
         """Put a job at the end of those that wait."""
         job = Job(max(self.all, default=0) + 1, kind, dict(order), dict(subject))
-        self.out(job).mkdir(parents=True)
+        # a server that was killed just here has left the folder, and no record of the job
+        self.out(job).mkdir(parents=True, exist_ok=True)
         job.argv = KINDS[kind].argv(job.order, str(self.out(job)))
         self.all[job.number] = job
         self._save(job)

@@ -37,3 +37,14 @@ def test_what_the_user_waits_for_waits_for_no_diagnosis(kind: str, tmp_path: Pat
     assert wanted.state == "running"
     assert [job.state for job in others] == ["running"] * AT_ONCE + ["waiting"]
     assert starter.nice == {job.number: NICE for job in others[:AT_ONCE]} | {wanted.number: 0}
+
+
+def test_a_folder_without_a_record_is_taken_by_the_next_job(tmp_path: Path) -> None:
+    (tmp_path / "0001" / "out").mkdir(parents=True)  # the server was killed before the record
+    jobs = Jobs(tmp_path)
+    try:
+        job = jobs.add("catalogue", {}, {})
+        assert jobs.place(job) == tmp_path / "0001"
+        assert (tmp_path / "0001" / "job.json").exists()
+    finally:
+        jobs.close()
