@@ -68,6 +68,8 @@ class Desk:
         for job in last.values():
             if job.state == "interrupted" and job.kind in GOES_ON:
                 jobs.add(job.kind, job.order, job.subject)
+        for opened in session:  # what a server that was killed had not recorded yet
+            self._looked_at(opened)
 
     def do(self, wish: Mapping[str, Any]) -> Mapping[str, Any]:
         """Do what the page asks for.
@@ -210,6 +212,10 @@ class Desk:
                 self.jobs.cancel(job)
             self._early = [job for job in self._early if job not in fits]
             return
+        self._looked_at(opened)
+
+    def _looked_at(self, opened: Opened) -> None:
+        """Compute what is not known of the model that is looked at."""
         for model in opened.models:
             if model.number == opened.told.get("current"):
                 self._computed(opened, model, self._quantity(opened, model))

@@ -241,6 +241,22 @@ def test_a_restart_shows_the_same_and_what_ran_is_interrupted(served: Served, op
     until(lambda: not alive(pid))
 
 
+def test_a_diagnosis_that_was_never_recorded_is_made_after_a_restart(
+    served: Served, opened: str
+) -> None:
+    until(lambda: served.campaign(opened)["models"][0]["verdict"])
+    folder = served.folder / "session"
+    served.close()
+    for record in (folder / "jobs").glob("*/job.json"):
+        if json.loads(record.read_text())["kind"] == "diagnose":
+            record.unlink()
+    for document in folder.rglob("diagnosis.json"):
+        document.unlink()
+    jobs = Jobs(folder / "jobs", RUNNER)
+    Desk(Session(folder), jobs, [])
+    assert [job.kind for job in jobs.all.values() if not job.over] == ["diagnose"]
+
+
 def test_what_nobody_has_asked_for_goes_on_after_a_restart(tmp_path: Path) -> None:
     session, folder = Session(tmp_path / "session"), tmp_path / "session" / "jobs"
     (tmp_path / "session" / "effects.json").write_text("{}")
