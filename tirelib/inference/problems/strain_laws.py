@@ -25,11 +25,12 @@ SHARED = 5.0
 """Size of an error by which another constant of the same part of the tire goes with the effect."""
 PARTS = {"k_u": "sidewall", "k_v": "sidewall", "k_t": "tread"}
 """Stiffnesses of a state, and the part of the tire (`FIELDS`) that they belong to."""
-GOES, SHAPED, SHAPED_BY_SPEED, PLACED = 1.7, 1.7, 0.7, 0.2
+GOES, LOCAL, BY_LOAD, BY_SPEED, PLACED, SHAPED = 1.7, 1.0, 1.0, 0.5, 0.2, 1.7
 """Sizes of an error's parts over that of the law (`tirelib.inference.statistics.law_errors.LAWS`):
-it goes otherwise with conditions, has another shape, one that goes with speed, is at another place
-or sharper. Root mean squares over twelve campaigns of the rig with a hidden effect are .35, .2, .07
-and .03, over four of the continuum .18, .25, .09 and .03."""
+it goes otherwise with conditions; is larger or smaller from place to place, always, with load and
+with speed; is at another place or sharper; has another shape."""
+LEAST = 0.05
+"""Part of the effect below which what it does in a place is left out."""
 
 LOOKALIKE_SHARE = 0.075
 """How much of what a law does may be an error that looks like any one other effect, beyond these
@@ -41,9 +42,10 @@ def law_errors(
 ) -> FloatArray:
     """Return errors of a law, each as large as what the effect does.
 
-    The effect goes otherwise with load, pressure, speed and time, by a slope and by a curvature;
-    acts a little further ahead or behind, and more or less sharply; and smooth shapes round the
-    turn, as large as the rows are in that run, are added, constant or going with load or speed.
+    The effect goes otherwise with load, pressure, speed and time, by a slope and by a curvature.
+    From place to place on the turn it is larger or smaller, always or with load or with speed, and
+    acts a little further ahead or behind; and it is more or less sharp. What it does where the law
+    does nothing is a smooth shape, as large as the rows are nearby in that run.
 
     Parameters
     ----------
@@ -70,15 +72,21 @@ def law_errors(
     conditions = conditions - conditions[:, :present].mean(axis=1, keepdims=True)
     goes = np.concatenate([conditions, _bent(conditions, present)])
     otherwise = GOES * (goes[:, None, :, None] * rows[None]).reshape(-1, *rows.shape[1:])
-    square = np.sum(rows**2, axis=0)
-    mean = np.mean(square, axis=1, keepdims=True)
-    size = np.sqrt(ANYWHERE * mean + (1.0 - ANYWHERE) * _nearby(square, half_angle))
-    shape = bumps(along_turn(GRID, half_angle), SHAPES.knots, SHAPES.reach) * size
-    shape = SHAPED * (shape - shape.mean(axis=2, keepdims=True))
-    by_load = shape * conditions[0, :, None]
-    by_speed = SHAPED_BY_SPEED / SHAPED * shape * conditions[1, :, None]
-    placed = PLACED * np.concatenate(_elsewhere(rows, half_angle))
-    return np.concatenate([otherwise, placed, shape, by_load, by_speed])
+    place = bumps(along_turn(GRID, half_angle), SHAPES.knots, SHAPES.reach)
+    moved, blurred = _elsewhere(rows, half_angle)
+    local = _in_places(rows, place)
+    load, speed = conditions[:2, :, None]
+    return np.concatenate(
+        [
+            otherwise,
+            PLACED * blurred,
+            LOCAL * local,
+            BY_LOAD * local * load,
+            BY_SPEED * local * speed,
+            PLACED * _in_places(moved, place),
+            SHAPED * _level(place * _nearby(np.sum(rows**2, axis=0), half_angle)),
+        ]
+    )
 
 
 def stiffened(before: State, after: State) -> dict[str, FloatArray]:
@@ -169,8 +177,22 @@ def _elsewhere(rows: FloatArray, half_angle: FloatArray) -> tuple[FloatArray, Fl
     return moved, blurred
 
 
+def _in_places(rows: FloatArray, place: FloatArray) -> FloatArray:
+    """Return what rows (components, n_runs, n_phi) do in each place, (n, n_runs, n_phi)."""
+    every = (rows[:, None] * place).reshape(-1, *place.shape[1:])
+    size = np.sqrt(np.mean(every**2, axis=(1, 2)))
+    return _level(every[size > LEAST * np.sqrt(np.mean(rows**2))])
+
+
+def _level(rows: FloatArray) -> FloatArray:
+    """Return rows without their mean round the turn, which no gage measures."""
+    return np.asarray(rows - rows.mean(axis=2, keepdims=True))
+
+
 def _nearby(square: FloatArray, half_angle: FloatArray) -> FloatArray:
-    """Return squares (n_runs, n_phi) averaged over about half a contact's length."""
+    """Return the size of squares (n_runs, n_phi) within about half a contact, and a bit of it anywhere."""
     order = np.fft.rfftfreq(GRID.size, 1.0 / GRID.size)
     gain = np.exp(-0.5 * (half_angle[:, None] * order) ** 2)
-    return np.asarray(np.maximum(np.fft.irfft(np.fft.rfft(square) * gain, n=GRID.size), 0.0))
+    here = np.maximum(np.fft.irfft(np.fft.rfft(square) * gain, n=GRID.size), 0.0)
+    mean = np.mean(square, axis=1, keepdims=True)
+    return np.asarray(np.sqrt(ANYWHERE * mean + (1.0 - ANYWHERE) * here))
