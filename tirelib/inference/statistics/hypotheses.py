@@ -126,14 +126,12 @@ class Hypotheses:
         that does not explain something by each effect (`explains`), it is something else that makes
         the runs likelier, and no effect is there.
         """
-        larger = self._larger(hypothesis)
+        larger = [h for h in self._larger(hypothesis) if h.plausible and self.explains(h)]
         if hypothesis.p <= self.false_alarm or not larger:
             return hypothesis
-        rival, further = max(larger, key=lambda each: each[0].exact_in[each[1]])
-        p = self._p_beside(hypothesis, rival, further)
-        if not rival.plausible or max(p, rival.exact_plain[further]) > self.false_alarm:
-            return hypothesis
-        if not self.explains(rival):
+        rival = max(larger, key=lambda h: h.unnamed)
+        p = self._count(hypothesis) * float(np.exp(min(hypothesis.unnamed - rival.unnamed, 0.0)))
+        if p > self.false_alarm:
             return hypothesis
         out = replace(hypothesis, rival=" and ".join(self.added(rival)), p_rival=p)
         self._made[frozenset(self.added(hypothesis))] = out
@@ -151,58 +149,14 @@ class Hypotheses:
             for own, gained in hypothesis.promises
         )
 
-    def _p_beside(self, hypothesis: Hypothesis, larger: Hypothesis, further: int) -> float:
-        """Return the p-value of a hypothesis against one effect more, as in `against_larger`."""
-        ratio = min(hypothesis.unnamed - larger.exact_in[further], 0.0)
-        return self._count(hypothesis) * float(np.exp(ratio))
-
     def _count(self, hypothesis: Hypothesis) -> int:
         """Return of how many effects one may be missing beside a hypothesis."""
         return len(self.effects) - len(self.added(hypothesis))
 
-    def _larger(self, hypothesis: Hypothesis) -> list[tuple[Hypothesis, int]]:
-        """Return the hypotheses of one effect more that were fitted, and the places of this one."""
+    def _larger(self, hypothesis: Hypothesis) -> list[Hypothesis]:
+        """Return the hypotheses of one effect more that were fitted."""
         names = set(hypothesis.names)
-        larger = [h for h in self.tried if len(h.names) == len(names) + 1 and names < set(h.names)]
-        return [(h, k) for h in larger for k, name in enumerate(h.names) if name not in names]
-
-    def without_plain(self, hypothesis: Hypothesis) -> Hypothesis | None:
-        """Return the hypothesis of those of its effects that are larger than plain tires show.
-
-        It is not rejected where the given one is not. None where no effect is larger, or where
-        those that are explain nothing by themselves (`explains`). The error that its law may have
-        can hide how large an effect is. An effect stays as well where it is larger with an exact
-        law, and the hypothesis without it would be rejected for it.
-        """
-        had = len(self.had)
-        larger = [
-            name
-            for k, name in enumerate(self.added(hypothesis), had)
-            if hypothesis.p_plain(k) <= self.false_alarm or self._missed(hypothesis, k)
-        ]
-        if not larger or tuple(larger) == self.added(hypothesis):
-            return hypothesis if larger else None
-        found = self.at(larger)
-        if found is None or not found.plausible:
-            return hypothesis  # fewer effects have no fit, or one out of their ranges
-        if not self.explains(found):
-            return None  # what is left is there only beside effects that are not
-        if found.p >= hypothesis.p:
-            return found
-        out = replace(found, p_beside=hypothesis.p)
-        self._made[frozenset(larger)] = out
-        return out
-
-    def _missed(self, hypothesis: Hypothesis, index: int) -> bool:
-        """Return whether the hypothesis without an effect is rejected for it: `against_larger`.
-
-        It is fitted here if it was not yet.
-        """
-        if hypothesis.exact_plain[index] > self.false_alarm:
-            return False
-        gone = hypothesis.names[index]
-        less = self.at([name for name in self.added(hypothesis) if name != gone])
-        return less is not None and self._p_beside(less, hypothesis, index) <= self.false_alarm
+        return [h for h in self.tried if len(h.names) == len(names) + 1 and names < set(h.names)]
 
     def _alone(self, place: str, names: Sequence[str], near: Hypothesis) -> Hypothesis | None:
         """Return a hypothesis from a fit nearby; None where no fit settles."""
@@ -233,20 +187,28 @@ class Hypotheses:
         return max(as_good, key=lambda h: h.likelihood, default=None)
 
     def explains(self, hypothesis: Hypothesis) -> bool:
-        """Return whether each of its effects, with exact laws, makes the runs likelier.
+        """Return whether each of its effects is there, and not only the error of its law.
 
-        Compared are the hypotheses without the effect that were fitted, all laws exact: the error
-        that a law may have is flexible, and would explain something else. That nothing is missing
-        is rejected already; beside others an effect is one of all that might be there, so that its
-        likelihood ratio has to be n / alpha.
+        It has to be larger than plain tires show it, and its exact law has to make the runs
+        likelier than those hypotheses without the effect that were fitted: with all laws exact, or
+        with the other laws roughly right. That nothing is missing is rejected already; beside
+        others an effect is one of all that might be there, so that its p-value has to be alpha / n
+        and its likelihood ratio n / alpha.
         """
-        added = self.added(hypothesis)
-        fewer = (self._made.get(frozenset(added) - {name}) for name in added)
-        return all(
-            self._likelier(hypothesis, less, 0 if less is self.base else 1)
-            for less in fewer
-            if less is not None
-        )
+        added, had = self.added(hypothesis), len(self.had)
+        if len(added) == 1:
+            shown = min(hypothesis.p_plain(had), hypothesis.exact_plain[had])
+            return shown <= self.false_alarm and self._likelier(hypothesis, self.base, 0)
+        level = self.false_alarm / len(self.effects)
+        for k, name in enumerate(added, had):
+            less = self._made.get(frozenset(added) - {name})
+            if hypothesis.p_plain(k) > level:
+                return False
+            if less is not None:
+                gains = hypothesis.unnamed_exact - less.unnamed_exact, hypothesis.exact_in[k] - less.unnamed
+                if max(gains) < -np.log(level):
+                    return False
+        return True
 
     def supported(self, hypothesis: Hypothesis) -> bool:
         """Return whether its laws, taken as exact, explain the runs better than no effect does.

@@ -58,6 +58,8 @@ class Hypothesis:
     unnamed : float
         Largest log likelihood where a cause without a name acts as well, [nats]. This cause is more
         of a group of smooth shapes than plain tires have. Laws are roughly right, or exact.
+    unnamed_exact : float
+        With exact laws.
     exact_in : tuple of float
         The same where the law of one effect is exact, for each effect in turn.
     exact_plain : tuple of float
@@ -80,6 +82,7 @@ class Hypothesis:
     likelihood: float
     promises: tuple[tuple[float, Mapping[str, float]], ...]
     unnamed: float
+    unnamed_exact: float
     exact_in: tuple[float, ...]
     exact_plain: tuple[float, ...]
     rival: str = ""
@@ -205,6 +208,7 @@ def judged(
         likelihoods.of(likeliest),
         tuple((likelihoods.of(e), likelihoods.gained(e)) for e in (exact, alone, likeliest)),
         max(likelihoods.unnamed(each) for each in (likeliest, exact)),
+        likelihoods.unnamed(exact),
         tuple(likelihoods.exact_in(k) for k in range(len(fit.effects))),
         tuple(_p_plain(sharp, fit, k) for k in range(len(fit.effects))),
     )

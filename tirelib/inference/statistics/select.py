@@ -144,21 +144,20 @@ def select(
         simpler = {h: hypotheses.simpler(h) for h in staying}
         members = [h for h in staying if simpler[h] is None]
         if members:
-            return done(*_smallest([hypotheses.without_plain(h) for h in members]))
+            return done(*_smallest(members))
         if staying:
             likeliest = max(filter(None, simpler.values()), key=lambda h: h.likelihood)
             if likeliest is hypotheses.base or not hypotheses.supported(likeliest):
                 return done("unknown", ())
             return done("form_inadequate", [likeliest])
-        # where no hypothesis explains anything by itself, one of more effects may
-        leaders = (fitted or [h for h in every if h.plausible])[:LEADERS]
+        # where a hypothesis explains nothing by itself, one of more effects may
+        leaders = [h for h in every if h.plausible][:LEADERS]
     leader = leaders[0] if leaders else None
     while many and leader is not None and leader.plausible and not np.isfinite(leader.looseness):
         further = _further(leader, hypotheses.effects, 1)
         leader = hypotheses.at((*hypotheses.added(leader), *further), leader) if further else None
     found = many and leader is not None and leader.plausible
     best = leader if found else _with_loose_laws(hypotheses)
-    best = best and hypotheses.without_plain(best)
     if best is not None:
         return done("form_inadequate", [best, *(_alike(hypotheses, best) if many else ())])
     return done("unknown", ())
@@ -172,7 +171,7 @@ def _with_loose_laws(hypotheses: Hypotheses) -> Hypothesis | None:
     """
     for size in range(1, MOST_EFFECTS + 1):
         same = [h for h in hypotheses.tried if len(hypotheses.added(h)) == size]
-        loose = [h for h in same if 1.0 < h.looseness < np.inf and hypotheses.supported(h)]
+        loose = [h for h in same if 1.0 < h.looseness < np.inf and hypotheses.supported(h) and hypotheses.explains(h)]
         best = max(loose, key=lambda h: h.likelihood, default=None)
         if best is not None and best.plausible:
             return best
