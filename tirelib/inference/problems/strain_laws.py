@@ -25,10 +25,10 @@ SHARED = 5.0
 """Size of an error by which another constant of the same part of the tire goes with the effect."""
 PARTS = {"k_u": "sidewall", "k_v": "sidewall", "k_t": "tread"}
 """Stiffnesses of a state, and the part of the tire (`FIELDS`) that they belong to."""
-GOES, LOCAL, BY_LOAD, BY_SPEED, PLACED, SHAPED = 1.7, 1.0, 1.0, 0.5, 0.2, 1.7
+LARGER, BY_SPEED, PLACED = 1.7, 0.5, 0.4
 """Sizes of an error's parts over that of the law (`tirelib.inference.statistics.law_errors.LAWS`):
-it goes otherwise with conditions; is larger or smaller from place to place, always, with load and
-with speed; is at another place or sharper; has another shape."""
+the effect is larger or smaller, goes with speed from place to place, and is displaced. Half and
+double of each: docs/theory/verdict_numbers.md."""
 LEAST = 0.05
 """Part of the effect below which what it does in a place is left out."""
 
@@ -44,8 +44,8 @@ def law_errors(
 
     The effect goes otherwise with load, pressure, speed and time, by a slope and by a curvature.
     From place to place on the turn it is larger or smaller, always or with load or with speed, and
-    acts a little further ahead or behind; and it is more or less sharp. What it does where the law
-    does nothing is a smooth shape, as large as the rows are nearby in that run.
+    acts a little further ahead or behind. What it does where the law does nothing is a smooth
+    shape, as large as the rows are nearby in that run.
 
     Parameters
     ----------
@@ -71,20 +71,16 @@ def law_errors(
     )
     conditions = conditions - conditions[:, :present].mean(axis=1, keepdims=True)
     goes = np.concatenate([conditions, _bent(conditions, present)])
-    otherwise = GOES * (goes[:, None, :, None] * rows[None]).reshape(-1, *rows.shape[1:])
+    otherwise = (goes[:, None, :, None] * rows).reshape(-1, *rows.shape[1:])
     place = bumps(along_turn(GRID, half_angle), SHAPES.knots, SHAPES.reach)
-    moved, blurred = _elsewhere(rows, half_angle)
-    local = _in_places(rows, place)
+    local = _in_places(rows, place, present)
+    shape = _level(place * _nearby(np.sum(rows**2, axis=0), half_angle))
     load, speed = conditions[:2, :, None]
     return np.concatenate(
         [
-            otherwise,
-            PLACED * blurred,
-            LOCAL * local,
-            BY_LOAD * local * load,
+            LARGER * np.concatenate([otherwise, local, local * load, shape]),
             BY_SPEED * local * speed,
-            PLACED * _in_places(moved, place),
-            SHAPED * _level(place * _nearby(np.sum(rows**2, axis=0), half_angle)),
+            PLACED * _in_places(_displaced(rows, half_angle), place, present),
         ]
     )
 
@@ -157,7 +153,7 @@ def _bent(conditions: FloatArray, present: int) -> FloatArray:
     """Return the squares of conditions (n, n_runs), with the spread that each condition has.
 
     A law that levels off, where the effect's law goes on, differs by a curvature. Its size is that
-    of the slopes, `GOES`: raised or halved, it has not been measured by itself.
+    of the slopes, `LARGER`: raised or halved, it has not been measured by itself.
     """
     here = conditions[:, :present]
     spread = here.std(axis=1, keepdims=True)
@@ -165,23 +161,21 @@ def _bent(conditions: FloatArray, present: int) -> FloatArray:
     return np.asarray(0.5 * (square - spread))
 
 
-def _elsewhere(rows: FloatArray, half_angle: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return how rows change as they move by half a contact, and as they blur by as much.
-
-    The terms of first and second order of a Taylor series in the half contact angle.
-    """
+def _displaced(rows: FloatArray, half_angle: FloatArray) -> FloatArray:
+    """Return how rows change as they move by half a contact, to first order."""
     order = np.fft.rfftfreq(GRID.size, 1.0 / GRID.size)
     slope = 1j * half_angle[:, None] * order
-    waves = np.fft.rfft(rows)
-    moved, blurred = (np.fft.irfft(by * waves, n=GRID.size) for by in (slope, slope**2 / 2.0))
-    return moved, blurred
+    return np.asarray(np.fft.irfft(slope * np.fft.rfft(rows), n=GRID.size))
 
 
-def _in_places(rows: FloatArray, place: FloatArray) -> FloatArray:
-    """Return what rows (components, n_runs, n_phi) do in each place, (n, n_runs, n_phi)."""
+def _in_places(rows: FloatArray, place: FloatArray, present: int) -> FloatArray:
+    """Return what rows (components, n_runs, n_phi) do in each place, (n, n_runs, n_phi).
+
+    Places where they do next to nothing in the runs that are measured are left out.
+    """
     every = (rows[:, None] * place).reshape(-1, *place.shape[1:])
-    size = np.sqrt(np.mean(every**2, axis=(1, 2)))
-    return _level(every[size > LEAST * np.sqrt(np.mean(rows**2))])
+    size = np.sqrt(np.mean(every[:, :present] ** 2, axis=(1, 2)))
+    return _level(every[size > LEAST * np.sqrt(np.mean(rows[:, :present] ** 2))])
 
 
 def _level(rows: FloatArray) -> FloatArray:
@@ -190,7 +184,10 @@ def _level(rows: FloatArray) -> FloatArray:
 
 
 def _nearby(square: FloatArray, half_angle: FloatArray) -> FloatArray:
-    """Return the size of squares (n_runs, n_phi) within about half a contact, and a bit of it anywhere."""
+    """Return the size of what squares (n_runs, n_phi) are nearby, and a share of it anywhere.
+
+    Nearby is within about half a contact's length.
+    """
     order = np.fft.rfftfreq(GRID.size, 1.0 / GRID.size)
     gain = np.exp(-0.5 * (half_angle[:, None] * order) ** 2)
     here = np.maximum(np.fft.irfft(np.fft.rfft(square) * gain, n=GRID.size), 0.0)

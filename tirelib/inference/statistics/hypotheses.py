@@ -117,14 +117,12 @@ class Hypotheses:
         """Return a hypothesis that is not rejected with its p-value against one effect more.
 
         The error that a law may have can cover what a further effect does. Then nothing stands out
-        beside the hypothesis. Where the further effect really acts, the runs are likelier with this
-        effect, its law taken as exact, than without it. Any of n effects may be the further one: a
-        likelihood ratio of n / p in favour of one of them has at most the probability p where none
-        is there (Bonferroni, and Royall as in `tirelib.inference.statistics.rival`), with errors of
-        laws of a known size. Something without a name may stand beside either. Where the likeliest
-        further effect is out of its range, no larger than plain tires show, or part of a hypothesis
-        that does not explain something by each effect (`explains`), it is something else that makes
-        the runs likelier, and no effect is there.
+        beside the hypothesis. Where the further effect really acts, the runs are likelier with it,
+        laws roughly right. Any of n effects may be the further one: a likelihood ratio of n / p in
+        favour of one of them has at most the probability p where none is there (Bonferroni, and
+        Royall as in `tirelib.inference.statistics.rival`), with errors of laws of a known size.
+        Something without a name may stand beside either. A larger hypothesis counts only if its
+        strengths are in their ranges and each of its effects is there (`explains`).
         """
         larger = [h for h in self._larger(hypothesis) if h.plausible and self.explains(h)]
         if hypothesis.p <= self.false_alarm or not larger:
@@ -189,41 +187,43 @@ class Hypotheses:
     def explains(self, hypothesis: Hypothesis) -> bool:
         """Return whether each of its effects is there, and not only the error of its law.
 
-        It has to be larger than plain tires show it, and its exact law has to make the runs
-        likelier than those hypotheses without the effect that were fitted: with all laws exact, or
-        with the other laws roughly right. That nothing is missing is rejected already; beside
-        others an effect is one of all that might be there, so that its p-value has to be alpha / n
-        and its likelihood ratio n / alpha.
+        Each has to be larger than plain tires show it. And its law has to make the runs likelier
+        without an error, for errors are flexible and would explain something else. That nothing is
+        missing is rejected already. Beside others an effect is one of n that might be there, so
+        that its p-value has to be alpha / n, and its likelihood ratio n / alpha.
         """
         added, had = self.added(hypothesis), len(self.had)
+        shown = max(hypothesis.p_plain(k) for k in range(had, had + len(added)))
         if len(added) == 1:
-            shown = min(hypothesis.p_plain(had), hypothesis.exact_plain[had])
-            return shown <= self.false_alarm and self._likelier(hypothesis, self.base, 0)
+            return shown <= self.false_alarm and self.supported(hypothesis, 1.0)
         level = self.false_alarm / len(self.effects)
-        for k, name in enumerate(added, had):
-            less = self._made.get(frozenset(added) - {name})
-            if hypothesis.p_plain(k) > level:
-                return False
-            if less is not None:
-                gains = hypothesis.unnamed_exact - less.unnamed_exact, hypothesis.exact_in[k] - less.unnamed
-                if max(gains) < -np.log(level):
-                    return False
-        return True
+        return shown <= level and all(
+            self._needed(hypothesis, k) >= -np.log(level) for k in range(had, had + len(added))
+        )
 
-    def supported(self, hypothesis: Hypothesis) -> bool:
+    def _needed(self, hypothesis: Hypothesis, index: int) -> float:
+        """Return how much likelier an effect with an exact law makes the runs, [nats].
+
+        The hypothesis is compared with that of its other effects, whose laws are exact as well, or
+        roughly right on both sides. Something without a name may stand beside either. Infinity
+        where the other effects were not fitted.
+        """
+        less = self._made.get(frozenset(self.added(hypothesis)) - {hypothesis.names[index]})
+        if less is None:
+            return np.inf
+        exact = hypothesis.unnamed_exact - less.unnamed_exact
+        return max(exact, hypothesis.exact_in[index] - less.unnamed)
+
+    def supported(self, hypothesis: Hypothesis, odds: float | None = None) -> bool:
         """Return whether its laws, taken as exact, explain the runs better than no effect does.
 
         Where only the errors of laws make the runs likelier, something else is there. The
-        likelihood ratio has to be n / alpha for each effect.
+        likelihood ratio has to be n / alpha for each effect, or as it is given.
         """
-        return self._likelier(hypothesis, self.base, len(self.added(hypothesis)))
-
-    def _likelier(self, hypothesis: Hypothesis, less: Hypothesis, more: int) -> bool:
-        """Return whether it is likelier by what so many effects have to bring, all laws exact."""
-        odds = more * np.log(len(self.effects) / self.false_alarm)
-        if less is self.base:
-            less = self._base_against(hypothesis.exact - less.exact - odds)
-        return bool(hypothesis.exact - less.exact >= odds)
+        if odds is None:
+            odds = (len(self.effects) / self.false_alarm) ** len(self.added(hypothesis))
+        ahead = hypothesis.exact - np.log(odds)
+        return bool(ahead >= self._base_against(ahead - self.base.exact).exact)
 
     def _base_against(self, ahead: float) -> Hypothesis:
         """Return the base; if it may catch up with a hypothesis so far ahead, its fit settles."""

@@ -62,15 +62,11 @@ class Hypothesis:
         With exact laws.
     exact_in : tuple of float
         The same where the law of one effect is exact, for each effect in turn.
-    exact_plain : tuple of float
-        `p_plain` of each effect with exact laws.
     rival : str
         Effects of a hypothesis of as many effects that is likelier; empty where there is none.
     p_rival : float
         p-value of the likelihood ratio in favour of the rival
         (`tirelib.inference.statistics.rival`).
-    p_beside : float
-        p-value with further effects beside these that are no larger than plain tires show.
     """
 
     fit: Posterior
@@ -84,10 +80,8 @@ class Hypothesis:
     unnamed: float
     unnamed_exact: float
     exact_in: tuple[float, ...]
-    exact_plain: tuple[float, ...]
     rival: str = ""
     p_rival: float = 1.0
-    p_beside: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -126,11 +120,8 @@ class Hypothesis:
 
     @property
     def p(self) -> float:
-        """p-value of the hypothesis: of the statistic, or of its rival if that is smaller.
-
-        What plain tires show is no part of the hypothesis: the largest over sizes of it counts.
-        """
-        return max(min(self.p_of(self.statistic)[0], self.p_rival), self.p_beside)
+        """p-value of the hypothesis: of the statistic, or of its rival if that is smaller."""
+        return min(self.p_of(self.statistic)[0], self.p_rival)
 
     @property
     def p_std(self) -> float:
@@ -149,7 +140,15 @@ class Hypothesis:
         By chi-squared of its strength, whose variance is that of the fit with roughly right laws
         and that of plain tires; the largest over the families.
         """
-        return _p_plain(self.nulls, self.fit, index)
+        name, place, p = self.names[index], self.fit.place(index), 0.0
+        for null in self.nulls:
+            weighed, size = null.likeliest, null.size.of(name, null.gage)
+            strength = weighed.mean(weighed.normal.right)[place]
+            left = strength - size * null.family.means.get(name, 0.0)
+            shown = size**2 * null.shown.get(name, 0.0) * np.eye(left.size)
+            square = left @ np.linalg.solve(weighed.covariance[place, place] + shown, left)
+            p = max(p, float(chi2.sf(square, left.size)))
+        return p
 
     def gain(self, name: str) -> float:
         """Return by how much a further effect with an exact law raises `exact`, to first order.
@@ -199,7 +198,7 @@ def judged(
         if stays:
             looseness = max((*each.laws, LAWS[-1])) / LAWS[-1]
             break
-    sharp, alone = likelihoods.nulls(exact), likeliest._replace(lookalike=0.0)
+    alone = likeliest._replace(lookalike=0.0)
     return Hypothesis(
         fit,
         *kept,
@@ -210,21 +209,7 @@ def judged(
         max(likelihoods.unnamed(each) for each in (likeliest, exact)),
         likelihoods.unnamed(exact),
         tuple(likelihoods.exact_in(k) for k in range(len(fit.effects))),
-        tuple(_p_plain(sharp, fit, k) for k in range(len(fit.effects))),
     )
-
-
-def _p_plain(nulls: Sequence[Null], fit: Posterior, index: int) -> float:
-    """Return the p-value of an effect that is as large as plain tires show it, by these tests."""
-    name, place, p = fit.names[index], fit.place(index), 0.0
-    for null in nulls:
-        weighed, size = null.likeliest, null.size.of(name, null.gage)
-        strength = weighed.mean(weighed.normal.right)[place]
-        left = strength - size * null.family.means.get(name, 0.0)
-        shown = size**2 * null.shown.get(name, 0.0) * np.eye(left.size)
-        square = left @ np.linalg.solve(weighed.covariance[place, place] + shown, left)
-        p = max(p, float(chi2.sf(square, left.size)))
-    return p
 
 
 def _calibrated(nulls: Sequence[Null], fit: Posterior, errors: Errors) -> tuple[FloatArray, ...]:

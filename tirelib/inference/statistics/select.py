@@ -9,11 +9,11 @@ that is like any one of them is covered. A hypothesis is rejected as well where 
 effects explains the runs much better (`tirelib.inference.statistics.rival`), whether the rival
 itself is rejected or not, or where one effect more makes the runs much likelier
 (`Hypotheses.against_larger`), and gives way to fewer of its effects that explain the runs as well
-(`Hypotheses.simpler`). A hypothesis counts only if each of its effects explains something
-(`Hypotheses.explains`). Every other hypothesis with p > alpha is in the set, without those of its
-effects that are no larger than plain tires show (`Hypothesis.p_plain`). Its smallest members are
-what the data say (Ferrari and Yang 2015): none in it, nothing is missing; one smallest member, that
-is what is missing; several, they cannot be told apart; none at all, something unknown is there.
+(`Hypotheses.simpler`). A hypothesis counts only if each of its effects is larger than plain tires
+show it and explains something (`Hypotheses.explains`). Every other hypothesis with p > alpha is in
+the set. Its smallest members are what the data say (Ferrari and Yang 2015): none in it, nothing is
+missing; one smallest member, that is what is missing; several, they cannot be told apart; none at
+all, something unknown is there.
 """
 
 from collections.abc import Callable, Sequence
@@ -144,7 +144,7 @@ def select(
         simpler = {h: hypotheses.simpler(h) for h in staying}
         members = [h for h in staying if simpler[h] is None]
         if members:
-            return done(*_smallest(members))
+            return done("named" if len(members) == 1 else "indistinguishable", members)
         if staying:
             likeliest = max(filter(None, simpler.values()), key=lambda h: h.likelihood)
             if likeliest is hypotheses.base or not hypotheses.supported(likeliest):
@@ -166,27 +166,17 @@ def select(
 def _with_loose_laws(hypotheses: Hypotheses) -> Hypothesis | None:
     """Return the smallest hypothesis that stays if its laws are off by as much as themselves.
 
-    It is the likeliest such of its size whose laws explain something; one that is out of its range
-    is not told.
+    It is the likeliest such of its size whose laws explain something and whose effects are all
+    there; one that is out of its range is not told.
     """
     for size in range(1, MOST_EFFECTS + 1):
         same = [h for h in hypotheses.tried if len(hypotheses.added(h)) == size]
-        loose = [h for h in same if 1.0 < h.looseness < np.inf and hypotheses.supported(h) and hypotheses.explains(h)]
+        loose = [h for h in same if 1.0 < h.looseness < np.inf]
+        loose = [h for h in loose if hypotheses.supported(h) and hypotheses.explains(h)]
         best = max(loose, key=lambda h: h.likelihood, default=None)
         if best is not None and best.plausible:
             return best
     return None
-
-
-def _smallest(members: Sequence[Hypothesis | None]) -> tuple[str, list[Hypothesis]]:
-    """Return the verdict on members of the confidence set, and the smallest of them.
-
-    None is one of which no effect is left (`Hypotheses.without_plain`): that nothing is missing is
-    rejected, so it is something unknown.
-    """
-    every = list(dict.fromkeys(filter(None, members)))
-    least = [h for h in every if not any(set(less.names) < set(h.names) for less in every)]
-    return ("unknown", "named", "indistinguishable")[min(len(least), 2)], least
 
 
 def _alike(hypotheses: Hypotheses, best: Hypothesis) -> list[Hypothesis]:

@@ -96,75 +96,58 @@ def test_a_true_hypothesis_seldom_gives_way_to_one_effect_more(law: float) -> No
     assert sum(each != (("twist",),) for each in found) <= 2  # upper 99 % bound of 5 % of 8
 
 
-def test_one_effect_more_is_not_there_if_plain_tires_show_as_much_of_it() -> None:
-    among = Hypotheses(planted(3, twist=1.0, bend=COVERED), FAMILIES)
+def twist_and_bend(among: Hypotheses) -> tuple[Hypothesis, Hypothesis]:
+    """Return the hypothesis of the twist, and that of the twist and the bend."""
     alone, both = among.at(["twist"]), among.at(["twist", "bend"])
     assert alone is not None
     assert both is not None
-    assert among.against_larger(alone).rival
-    further = both.names.index("bend")
-    for p, gives_way in ((0.04, True), (0.06, False)):
-        small = tuple(p if k == further else 0.0 for k in range(2))
-        among._made[frozenset(both.names)] = replace(both, exact_plain=small)
-        assert bool(among.against_larger(alone).rival) is gives_way
-
-
-@pytest.mark.parametrize(("p", "stays"), [(0.04, True), (0.06, False)])
-def test_an_effect_stays_without_which_the_hypothesis_would_be_rejected(
-    p: float, stays: bool
-) -> None:
-    among = Hypotheses(planted(3, twist=1.0), FAMILIES)
-    alone, both = among.at(["twist"]), among.at(["twist", "bend"])
-    assert alone is not None
-    assert both is not None
-    further = both.names.index("bend")
-    assert both.p_plain(further) > 0.05
-    assert among.without_plain(both) is not both
-    # two effects may be the further one beside "twist"
-    likely = alone.unnamed + np.log(2 / p)
-    likelier = replace(
-        both,
-        exact_in=tuple(likely if k == further else 0.0 for k in range(2)),
-        exact_plain=(0.0, 0.0),
-    )
-    assert (among.without_plain(likelier) is likelier) is stays
-    shown = replace(likelier, exact_plain=(0.06, 0.06))
-    assert among.without_plain(shown) is not shown
-
-
-def with_exact(hypothesis: Hypothesis, exact: float) -> Hypothesis:
-    """Return a hypothesis whose log likelihood with exact laws is another one."""
-    (_, further), *off = hypothesis.promises
-    return replace(hypothesis, promises=((exact, further), *off))
+    return alone, both
 
 
 @pytest.mark.parametrize("share", [0.99, 1.01])
-def test_an_effect_counts_only_if_its_exact_law_makes_the_runs_likelier(share: float) -> None:
-    among = Hypotheses(planted(3, twist=1.0), FAMILIES)
-    alone, both = among.at(["twist"]), among.at(["twist", "bend"])
-    assert alone is not None
-    assert both is not None
-    assert among.explains(alone)
-    # the likelihood ratio is that of one of three effects at five percent
-    odds = share * np.log(3 / 0.05)
-    # the hypothesis with "bend" alone was not fitted, and "twist" is not weighed
-    assert among.explains(with_exact(both, alone.exact + odds)) is (share > 1.0)
-    # that nothing is missing is rejected already
-    enough = with_exact(alone, among.base.exact + share - 1.0)
-    assert among.explains(enough) is (share > 1.0)
+def test_one_effect_more_is_not_there_if_plain_tires_show_as_much_of_it(
+    share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    among = Hypotheses(planted(3, twist=1.0, bend=COVERED), FAMILIES)
+    alone, both = twist_and_bend(among)
+    assert among.against_larger(alone).rival
+    further = both.names.index("bend")
+    # it is one of three that might be there
+    monkeypatch.setattr(
+        Hypothesis, "p_plain", lambda _, k: share * 0.05 / 3 if k == further else 0.0
+    )
+    assert bool(among.against_larger(alone).rival) is (share < 1.0)
 
 
-def test_what_explains_nothing_without_effects_that_plain_tires_show_is_not_told(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("share", [0.99, 1.01])
+@pytest.mark.parametrize("others", ["exact", "roughly right"])
+def test_an_effect_counts_only_if_its_exact_law_makes_the_runs_likelier(
+    others: str, share: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     among = Hypotheses(planted(3, twist=1.0), FAMILIES)
-    both = among.at(["twist", "bend"])
-    assert both is not None
-    alone = among.without_plain(both)
-    assert alone is not None
-    assert among.added(alone) == ("twist",)
-    monkeypatch.setattr(among, "explains", lambda h: set(h.names) != {"twist"})
-    assert among.without_plain(both) is None
+    alone, both = twist_and_bend(among)
+    monkeypatch.setattr(Hypothesis, "p_plain", lambda *_: 0.0)
+    # the likelihood ratio is that of one of three effects at five percent; the hypothesis with
+    # "bend" alone was not fitted, and "twist" is not weighed
+    odds, further = share * np.log(3 / 0.05), both.names.index("bend")
+    exact = alone.unnamed_exact + (odds if others == "exact" else 0.0)
+    own = alone.unnamed + (odds if others == "roughly right" else 0.0)
+    likelier = [own if k == further else 0.0 for k in range(2)]
+    each = replace(both, unnamed_exact=exact, exact_in=tuple(likelier))
+    assert among.explains(each) is (share > 1.0)
+
+
+@pytest.mark.parametrize("ahead", [-0.01, 0.01])
+def test_a_single_effect_counts_if_its_exact_law_makes_the_runs_likelier_at_all(
+    ahead: float,
+) -> None:
+    """That nothing is missing is rejected already."""
+    among = Hypotheses(planted(3, twist=1.0), FAMILIES)
+    alone, _ = twist_and_bend(among)
+    assert among.explains(alone)
+    (_, further), *off = alone.promises
+    likelier = replace(alone, promises=((among.base.exact + ahead, further), *off))
+    assert among.explains(likelier) is (ahead > 0.0)
 
 
 def test_what_only_errors_of_laws_explain_is_neither_a_member_nor_a_rival(
@@ -179,32 +162,19 @@ def test_what_only_errors_of_laws_explain_is_neither_a_member_nor_a_rival(
     assert not any("twist" in names for names in select(toy, FAMILIES).sets)
 
 
-def test_one_effect_more_has_to_be_likelier_than_something_without_a_name() -> None:
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_one_effect_more_has_to_be_likelier_than_something_without_a_name(share: float) -> None:
     among = Hypotheses(planted(3, twist=1.0, bend=COVERED), FAMILIES)
-    alone, both = among.at(["twist"]), among.at(["twist", "bend"])
-    assert alone is not None
-    assert both is not None
-    further = both.names.index("bend")
-    for gain, gives_way in ((0.0, False), (10.0, True)):
-        likelier = [alone.unnamed + gain if k == further else 0.0 for k in range(2)]
-        among._made[frozenset(both.names)] = replace(both, exact_in=tuple(likelier))
-        assert bool(among.against_larger(alone).rival) is gives_way
+    alone, both = twist_and_bend(among)
+    # two effects may be the further one beside "twist"
+    likely = alone.unnamed + share * np.log(2 / 0.05)
+    among._made[frozenset(both.names)] = replace(both, unnamed=likely)
+    assert bool(among.against_larger(alone).rival) is (share > 1.0)
 
 
-def test_one_effect_more_is_not_there_if_one_out_of_its_range_is_likelier() -> None:
+def test_one_effect_more_is_not_there_if_it_is_out_of_its_range() -> None:
     among = Hypotheses(planted(3, twist=1.0, bend=COVERED), FAMILIES)
-    alone, both, other = (
-        among.at(each) for each in (["twist"], ["twist", "bend"], ["twist", "swell"])
-    )
-    assert alone is not None
-    assert both is not None
-    assert other is not None
-    likelier = replace(
-        other, exact_in=tuple(1.0 + max(both.exact_in) for _ in other.names), plausible=False
-    )
-    among._made[frozenset(other.names)] = likelier
-    assert among.against_larger(alone) is alone
-    among._made[frozenset(other.names)] = other
+    alone, both = twist_and_bend(among)
     assert among.against_larger(alone).rival
     among._made[frozenset(both.names)] = replace(both, plausible=False)
     assert among.against_larger(alone) is alone

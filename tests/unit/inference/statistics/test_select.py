@@ -76,33 +76,18 @@ def test_an_effect_as_large_as_plain_tires_show_it_is_not_missing() -> None:
     random, larger = np.random.default_rng(3), []
     for _ in range(40):
         hypotheses = Hypotheses(Toy(drawn(random, bend=0.6)), FAMILIES)
-        both = hypotheses.at(("bend", "twist"))
-        assert both is not None
-        alone = hypotheses.without_plain(both)
+        alone, both = hypotheses.at(("bend",)), hypotheses.at(("bend", "twist"))
         assert alone is not None
-        assert "bend" in alone.names
-        larger.append("twist" in alone.names)
-        # what plain tires show is no part of a hypothesis
-        assert alone.p >= both.p
+        assert both is not None
+        assert hypotheses.explains(alone)
+        larger.append(both.p_plain(both.names.index("twist")) <= 0.05)
+        assert not hypotheses.explains(both)
     # 5 % wanted; 5 of 40 is the upper 98 % bound of a binomial
     assert sum(larger) <= 5
     plain = Hypotheses(Toy(drawn(random)), FAMILIES)
     twist = plain.at(("twist",))
     assert twist is not None
-    assert plain.without_plain(twist) is None
-
-
-def test_all_effects_stay_where_the_fit_of_fewer_does_not_settle(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    hypotheses = Hypotheses(Toy(drawn(np.random.default_rng(3), bend=0.6)), FAMILIES)
-    both = hypotheses.at(("bend", "twist"))
-    assert both is not None
-    alone = hypotheses.without_plain(both)
-    assert alone is not None
-    assert hypotheses.added(alone) == ("bend",)
-    monkeypatch.setattr(hypotheses, "at", lambda names: None)
-    assert hypotheses.without_plain(both) is both
+    assert not plain.explains(twist)
 
 
 def test_what_looks_alike_is_a_set() -> None:
@@ -229,8 +214,9 @@ def test_a_law_that_is_a_definition_has_no_error() -> None:
     assert named[True] == ()  # it may not be off, and nothing else explains what it leaves
 
 
-def test_an_effect_as_large_as_plain_tires_show_it_is_not_named_where_no_law_is_right(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(("twist", "kind"), [(0.0, "unknown"), (0.6, "form_inadequate")])
+def test_where_no_law_is_right_effects_that_are_all_larger_than_on_plain_tires_are_named(
+    monkeypatch: pytest.MonkeyPatch, twist: float, kind: str
 ) -> None:
     tested = Hypotheses._tested
 
@@ -240,8 +226,9 @@ def test_an_effect_as_large_as_plain_tires_show_it_is_not_named_where_no_law_is_
         return replace(h, p_rival=0.0, looseness=10.0 / 3.0 if len(fit.effects) == 2 else np.inf)
 
     monkeypatch.setattr(Hypotheses, "_tested", loose)
-    found = select(Toy(drawn(np.random.default_rng(2), bend=0.6)), FAMILIES)
-    assert (found.kind, found.sets) == ("form_inadequate", (("bend",),))
+    found = select(Toy(drawn(np.random.default_rng(2), bend=0.6, twist=twist)), FAMILIES)
+    assert found.kind == kind
+    assert [set(names) for names in found.sets] == [{"bend", "twist"}] * (kind != "unknown")
 
 
 @pytest.mark.parametrize(("least", "kind"), [(1, "unknown"), (2, "form_inadequate")])
