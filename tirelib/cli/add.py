@@ -11,7 +11,8 @@ from tirelib.cli.common import (
     NEW_FILE,
     NEW_FOLDER,
     output,
-    write_json,
+    say_written,
+    write_document,
 )
 from tirelib.cli.options import effects_option, json_option, model_option
 from tirelib.cli.progress import progress_bar, progress_options
@@ -107,26 +108,21 @@ def add(
 def _undo(model_name: str, out: Path, json_file: Path | None) -> None:
     from tirelib.core.parameters import read_tire, write_tire
     from tirelib.inference.extend.document import FORMAT as EXTENSION
+    from tirelib.inference.extend.document import told_history
     from tirelib.inference.extend.model_file import undone_file
 
     file, entry = undone_file(read_tire(model_name))
     write_tire(file, out, FORMAT)
-    console = output()
-    console.print(f"undone: {entry.get('action', 'add')} {entry.get('effect', '?')}")
-    console.print(f"written: {out}")
-    if json_file is not None:
-        history = [{k: v for k, v in e.items() if k != "before"} for e in file.extra["history"]]
-        write_json(
-            json_file,
-            {
-                "format": EXTENSION,
-                "action": "undo",
-                "effect": entry.get("effect"),
-                "effects": file.extra["effects"],
-                "history": history,
-            },
-        )
-        console.print(f"written: {json_file}")
+    output().print(f"undone: {entry.get('action', 'add')} {entry.get('effect', '?')}")
+    say_written(out)
+    document = {
+        "format": EXTENSION,
+        "action": "undo",
+        "effect": entry.get("effect"),
+        "effects": file.extra["effects"],
+        "history": told_history(file),
+    }
+    write_document(document, json_file)
 
 
 def _change(
@@ -173,14 +169,10 @@ def write_step(
     from tirelib.report.journey import write_extension
 
     write_tire(new, out, FORMAT)
-    console = output()
-    console.print(f"written: {out}")
+    say_written(out)
     if report is not None:
-        for path in write_extension(document, report):
-            console.print(f"written: {path}")
-    if json_file is not None:
-        write_json(json_file, document)
-        console.print(f"written: {json_file}")
+        say_written(*write_extension(document, report))
+    write_document(document, json_file)
 
 
 def _say(document: dict[str, Any]) -> None:

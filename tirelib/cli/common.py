@@ -132,6 +132,19 @@ NEW_PLACE = NewPlace(path_type=Path, file_okay=False)
 WIDTH = 120
 
 
+def say_written(*paths: Path | str) -> None:
+    """Say where files were written."""
+    for path in paths:
+        output().print(f"written: {path}")
+
+
+def write_document(document: dict[str, Any], *files: Path | None) -> None:
+    """Write a document into each file that is wanted, and say so."""
+    for file in filter(None, files):
+        write_json(file, document)
+        say_written(file)
+
+
 def output() -> Console:
     """Return the console for results, wide enough for tables when it is no terminal."""
     console = Console(highlight=False, markup=False)

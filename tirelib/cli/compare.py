@@ -11,7 +11,8 @@ from tirelib.cli.common import (
     NEW_FILE,
     NEW_FOLDER,
     output,
-    write_json,
+    say_written,
+    write_document,
 )
 from tirelib.cli.options import effects_option, json_option, model_option, quantity_option
 from tirelib.cli.progress import progress_bar, progress_options
@@ -102,7 +103,7 @@ def compare(
     write_told(found, out, json_file)
     if data_file is not None:
         write_plot_data(data_file, data)
-        output().print(f"written: {data_file}")
+        say_written(data_file)
 
 
 def write_told(
@@ -116,15 +117,11 @@ def write_told(
     console.print(_answer(document))
     for line in (*document["statements"], *document["messages"]):
         console.print(f"  {line}")
-    targets = [path for path in (json_file, out and out / "comparison.json") if path]
     if out is not None:
         from tirelib.report.comparison import write_comparison
 
-        for path in write_comparison(found, out):
-            console.print(f"written: {path}")
-    for path in targets:
-        write_json(path, document)
-        console.print(f"written: {path}")
+        say_written(*write_comparison(found, out))
+    write_document(document, json_file, out and out / "comparison.json")
     return document
 
 

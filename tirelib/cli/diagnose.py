@@ -13,7 +13,8 @@ from tirelib.campaign import Campaign, read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
     output,
-    write_json,
+    say_written,
+    write_document,
 )
 from tirelib.cli.options import (
     effects_option,
@@ -95,16 +96,11 @@ def write_told(
 
     document["explanation"] = explained(document, model_name, str(folder), effect_files)._asdict()
     _say(document, titled(document["explanation"]))
-    console = output()
-    targets = [path for path in (json_file, out and out / "diagnosis.json") if path]
     if out is not None:
         from tirelib.report.diagnosis import write_diagnosis
 
-        for path in write_diagnosis(told, document, out, file.extra.get("history", [])):
-            console.print(f"written: {path}")
-    for path in targets:
-        write_json(path, document)
-        console.print(f"written: {path}")
+        say_written(*write_diagnosis(told, document, out, file.extra.get("history", [])))
+    write_document(document, json_file, out and out / "diagnosis.json")
 
 
 def diagnosed(

@@ -18,7 +18,8 @@ from tirelib.cli.common import (
     NEW_FOLDER,
     output,
     plain,
-    write_json,
+    say_written,
+    write_document,
 )
 from tirelib.cli.options import effects_option, json_option, quantity_option
 from tirelib.cli.progress import chosen_words, progress_bar, progress_options
@@ -99,12 +100,8 @@ def explain(
         console.print(f"  {what}: {said}")
     for line in document["messages"]:
         console.print(f"  {line}")
-    for path in write_journey(journey, out):
-        console.print(f"written: {path}")
-    for target in (json_file, out / "explanation.json"):
-        if target is not None:
-            write_json(target, dict(document))
-            console.print(f"written: {target}")
+    say_written(*write_journey(journey, out))
+    write_document(dict(document), json_file, out / "explanation.json")
 
 
 class Steps:

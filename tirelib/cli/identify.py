@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from tirelib.campaign import Campaign, read_campaign
-from tirelib.cli.common import CAMPAIGN, NEW_FILE, NEW_FOLDER, output, write_json
+from tirelib.cli.common import CAMPAIGN, NEW_FILE, NEW_FOLDER, output, say_written, write_document
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import is_verbose, progress_bar, progress_options
 
@@ -129,10 +129,8 @@ def identify(
     for reason in document["reasons"]:
         if reason not in warned:
             console.print(f"  {reason}")
-    console.print(f"written: {out}")
-    if json_file is not None:
-        write_json(json_file, document)
-        console.print(f"written: {json_file}")
+    say_written(out)
+    write_document(document, json_file)
     following = [
         shlex.join(["tirelib", verb, str(folder), "--model", str(out), "--out", f"{verb}d"])
         for verb in ("compare", "diagnose")
@@ -140,8 +138,7 @@ def identify(
     if report is not None:
         from tirelib.report.identification import write_identification
 
-        for path in write_identification(document, report, commands=following):
-            console.print(f"written: {path}")
+        say_written(*write_identification(document, report, commands=following))
     console.print(f"next: {following[0]}")
     console.print(f"      {following[1]}")
     brush = document["brush"]

@@ -9,7 +9,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, Real, output, write_json
+from tirelib.cli.common import CAMPAIGN, FILE, Real, output, say_written, write_document
 from tirelib.cli.diagnose import diagnosed
 from tirelib.cli.diagnosis_file import belongs, read_diagnosis
 from tirelib.cli.options import (
@@ -271,21 +271,14 @@ def _for_force(
     return document, plan
 
 
-def _give(
-    document: dict[str, Any], plan: "Plan | None", out: Path | None, json_file: Path | None
-) -> None:
-    """Print and write an answer; a page where there is a plan."""
+def _give(document: dict[str, Any], plan: "Plan", out: Path | None, json_file: Path | None) -> None:
+    """Print an answer, and write it and its page."""
     _say(document)
-    console = output()
-    targets = [path for path in (json_file, out and out / "next_test.json") if path]
-    if out is not None and plan is not None:
+    if out is not None:
         from tirelib.report.next_test import write_next_test
 
-        for path in write_next_test(plan, out):
-            console.print(f"written: {path}")
-    for path in targets:
-        write_json(path, document)
-        console.print(f"written: {path}")
+        say_written(*write_next_test(plan, out))
+    write_document(document, json_file, out and out / "next_test.json")
 
 
 def _si(name: str, given: tuple[float, float] | None) -> "Range | None":

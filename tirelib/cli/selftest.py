@@ -8,7 +8,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, Real, Whole, output, write_json
+from tirelib.cli.common import CAMPAIGN, Real, Whole, output, say_written, write_document
 from tirelib.cli.options import (
     effects_option,
     false_alarm_option,
@@ -108,16 +108,11 @@ def selftest(
         )
     document = selftest_document(found) | error_of(runs, model).told
     _say(document)
-    console = output()
-    targets = [path for path in (json_file, out and out / "selftest.json") if path]
     if out is not None:
         from tirelib.report.selftest import write_selftest
 
-        for path in write_selftest(document, out):
-            console.print(f"written: {path}")
-    for path in targets:
-        write_json(path, document)
-        console.print(f"written: {path}")
+        say_written(*write_selftest(document, out))
+    write_document(document, json_file, out and out / "selftest.json")
 
 
 def _only(names: str | None, has: list[str], catalogue: Any) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from tirelib.cli.common import NEW_FOLDER, Real, output, write_json
+from tirelib.cli.common import NEW_FOLDER, Real, output, say_written, write_json
 from tirelib.cli.options import effects_option, json_option
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
@@ -201,8 +201,7 @@ def simulate(
     document = _document(file, model, done, notes, chosen) if targets else {}
     for target in targets:
         write_json(target, document)
-    for path in written:
-        output().print(f"written: {path}")
+    say_written(*written)
 
 
 def _model(

@@ -41,12 +41,14 @@ def extension_document(done: Extension | ForceExtension, file: TireFile) -> dict
         "waterfall": waterfall(file.extra["history"], str(head["quantity"])),
         "held_out": [fold.entry(old, new) for fold, old, new in held_out],
         "effects": list(file.extra["effects"]),
-        "history": [
-            {key: value for key, value in entry.items() if key != "before"}
-            for entry in file.extra["history"]
-        ],
+        "history": told_history(file),
         "messages": messages,
     }
+
+
+def told_history(file: TireFile) -> list[dict[str, Any]]:
+    """Return the history of a model without what was before each entry."""
+    return [{k: v for k, v in entry.items() if k != "before"} for entry in file.extra["history"]]
 
 
 def _strain(done: Extension) -> dict[str, Any]:
