@@ -17,7 +17,7 @@ from tirelib.cli.common import (
 from tirelib.cli.options import effects_option, json_option, model_option
 from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.core.errors import ParameterError
-from tirelib.journey import QUANTITIES
+from tirelib.journey import check_quantity
 
 if TYPE_CHECKING:
     from tirelib.core.parameters import TireFile
@@ -85,10 +85,7 @@ def add(
     json_file: Path | None,
 ) -> None:
     """Add effects to a model, fit it to CAMPAIGN and show how the error changes."""
-    if quantity is not None and quantity not in QUANTITIES:
-        raise ParameterError(
-            f"--quantity {quantity}: allowed are {', '.join(QUANTITIES)}; correct the name"
-        )
+    check_quantity(quantity)
     if undo:
         if effect_names or remove:
             raise ParameterError("--undo takes neither EFFECT nor --remove; leave them out")

@@ -19,7 +19,8 @@ from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.core.errors import ParameterError
 
 if TYPE_CHECKING:
-    from tirelib.inference.compare import Comparison, ForceComparison
+    from tirelib.inference.compare.forces import ForceComparison
+    from tirelib.inference.compare.strain import Comparison
 
 _EXAMPLE = """\b
 Examples:
@@ -80,7 +81,7 @@ def compare(
 ) -> None:
     """Compare a model with CAMPAIGN and show where it fails."""
     from tirelib.core.parameters import read_tire
-    from tirelib.inference.compare import compare as compare_model
+    from tirelib.journey import compare as compare_model
     from tirelib.model.registration import registered_effects
 
     catalogue = registered_effects(effect_files)

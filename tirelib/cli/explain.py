@@ -23,8 +23,8 @@ from tirelib.cli.common import (
 )
 from tirelib.cli.options import effects_option, json_option, quantity_option
 from tirelib.cli.progress import chosen_words, progress_bar, progress_options
-from tirelib.core.errors import CalibrationError, ParameterError, TirelibError
-from tirelib.journey import QUANTITIES, explains_forces
+from tirelib.core.errors import CalibrationError, TirelibError
+from tirelib.journey import check_quantity, explains_forces
 
 if TYPE_CHECKING:
     from tirelib.core.parameters import TireFile
@@ -86,10 +86,7 @@ def explain(
     from tirelib.report.explanation import titled
     from tirelib.report.journey import write_journey
 
-    if quantity is not None and quantity not in QUANTITIES:
-        raise ParameterError(
-            f"--quantity {quantity}: allowed are {', '.join(QUANTITIES)}; correct the name"
-        )
+    check_quantity(quantity)
     steps = Steps(folder, out, effect_files)  # faults of the campaign are said before files
     out.mkdir(parents=True, exist_ok=True)
     journey = steps.walk(model_name, quantity)

@@ -17,6 +17,7 @@ from tirelib.campaign import Campaign
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray, rms
 from tirelib.core.parameters import TireFile
 from tirelib.core.quantities import QUANTITIES
+from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.inference.compare.error import last_floor
 from tirelib.inference.compare.force_model import (
@@ -160,6 +161,7 @@ class ForceComparison:
         return np.asarray(self.predicted - self.measured)
 
 
+@one_thread()
 def compare_forces(
     campaign: Campaign,
     file: TireFile,
