@@ -173,7 +173,7 @@ def write_step(
 
 
 def _say(document: dict[str, Any]) -> None:
-    from tirelib.report.error_sentences import unmoved
+    from tirelib.report.error_sentences import fold_name, unmoved
     from tirelib.report.page import unit_name
 
     console = output()
@@ -196,22 +196,13 @@ def _say(document: dict[str, Any]) -> None:
         )
     for fold in document["held_out"]:
         console.print(
-            f"  {_left_out(fold)} left out: error {fold['error_before']:.3g} -> "
+            f"  {fold_name(fold)} left out: error {fold['error_before']:.3g} -> "
             f"{fold['error_after']:.3g}"
         )
     for line in unmoved(document):
         console.print(f"  {line}")
     for line in (*_warnings(document["flags"], *document["range"]), *document["messages"]):
         console.print(f"  {line}")
-
-
-def _left_out(fold: dict[str, Any]) -> str:
-    size = f"({fold['runs']} runs)" if "runs" in fold else f"({fold['points']} points)"
-    if fold["condition"] == "time":
-        return f"blocks of time, part {fold['value']:.0f} {size}"
-    if fold["condition"] == "cell":
-        return f"cells of conditions, part {fold['value']:.0f} {size}"
-    return f"{fold['condition']} {fold['value']:.4g} {fold['unit']} {size}"
 
 
 def _numbers(values: float | list[float]) -> str:

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.campaign import read_campaign
@@ -16,6 +15,7 @@ from tirelib.cli.common import (
     FILE,
     NEW_FILE,
     NEW_FOLDER,
+    new_table,
     output,
     say_written,
     write_document,
@@ -213,9 +213,10 @@ def print_document(name: str, document: dict[str, Any], calibration: Calibration
 
 
 def _summary_table(summary: dict[str, Any]) -> Table:
-    table = Table(box=SIMPLE_HEAD)
-    for column in ("quantity", "rmse", "unit", "% of range", "R2", "runs", "in 95 % interval"):
-        table.add_column(column, justify="left" if column in ("quantity", "unit") else "right")
+    table = new_table(
+        *("quantity", "rmse", "unit", "% of range", "R2", "runs", "in 95 % interval"),
+        words=("quantity", "unit"),
+    )
     for quantity, entry in summary.items():
         if entry is None:
             table.add_row(quantity, "not calibrated", *[""] * 5)

@@ -7,12 +7,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
 from tirelib.campaign import Campaign, read_campaign
-from tirelib.cli.common import CAMPAIGN, NEW_FILE, NEW_FOLDER, output, say_written, write_document
+from tirelib.cli.common import (
+    CAMPAIGN,
+    NEW_FILE,
+    NEW_FOLDER,
+    new_table,
+    output,
+    say_written,
+    write_document,
+)
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import is_verbose, progress_bar, progress_options
 
@@ -190,10 +197,10 @@ def _say_brush(console: Console, document: dict[str, Any]) -> None:
         f"{document['campaign']}: brush fitted to {forces['points']} points; residuals: {left}"
     )
     _say_parameters(console, brush["parameters"])
-    table = Table(box=SIMPLE_HEAD)
-    for column in ("stiffness over", "load N", "bar", "value", "95 % from", "to", "unit"):
-        words = column in ("stiffness over", "unit")
-        table.add_column(column, justify="left" if words else "right")
+    table = new_table(
+        *("stiffness over", "load N", "bar", "value", "95 % from", "to", "unit"),
+        words=("stiffness over", "unit"),
+    )
     for entry in brush["stiffness"]:
         bar = entry["pressure_bar"]
         table.add_row(
@@ -219,10 +226,9 @@ def _say_pressure(console: Console, found: dict[str, Any]) -> None:
         "lateral force with the ring's pressure and with a parabola, rms error in N (held-out "
         "points in brackets)"
     )
-    table = Table(box=SIMPLE_HEAD)
-    for column in ("by", "from", "to", "points", "ring", "parabola", "better"):
-        words = column in ("by", "better")
-        table.add_column(column, justify="left" if words else "right")
+    table = new_table(
+        *("by", "from", "to", "points", "ring", "parabola", "better"), words=("by", "better")
+    )
     for row in found["table"]:
         ends = ("", "") if row["by"] == "all" else (f"{row['low']:.4g}", f"{row['high']:.4g}")
         unit = f" {row['range_unit']}" if row["range_unit"] else ""
@@ -263,10 +269,10 @@ def _say_parameters(console: Console, parameters: list[dict[str, Any]]) -> None:
 
 
 def _table(parameters: list[dict[str, Any]]) -> Table:
-    table = Table(box=SIMPLE_HEAD)
-    for column in ("parameter", "value", "95 % from", "to", "unit", "flags"):
-        words = column in ("parameter", "unit", "flags")
-        table.add_column(column, justify="left" if words else "right")
+    table = new_table(
+        *("parameter", "value", "95 % from", "to", "unit", "flags"),
+        words=("parameter", "unit", "flags"),
+    )
     for entry in parameters:
         table.add_row(
             entry["name"],
