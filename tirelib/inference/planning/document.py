@@ -9,7 +9,6 @@ import numpy as np
 from tirelib.core.quantities import QUANTITIES
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.inference.compare.force_model import ForceModel
-from tirelib.inference.compare.forces import UNITS
 from tirelib.inference.diagnose.diagnose import FALSE_ALARM
 from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.diagnose.forces.models import plain_tires
@@ -199,7 +198,7 @@ def plan_document(plan: Plan) -> dict[str, Any]:
 def _noise(plan: Plan, test: NextTest) -> dict[str, Any]:
     if plan.quantity == "strain":
         return {"noise_ustrain": {"random": 1e6 * test.random, "structural": 1e6 * test.staying}}
-    unit = UNITS[plan.quantity]
+    unit = QUANTITIES[plan.quantity].unit
     return {"noise": {"random": test.random, "structural": test.staying, "unit": unit}}
 
 
