@@ -65,11 +65,11 @@ def plan_test(
     suspects: Suspects,
     envelope: Envelope | None,
     *,
-    campaign: str = "",
+    campaign: str,
     quantity: str = "strain",
     model: ForceModel | None = None,
     wanted: float = WANTED,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[str], None] | None,
 ) -> Plan:
     """Judge the runs of an envelope for suspects.
 
@@ -124,7 +124,7 @@ def next_test_document(
     hypotheses: Hypotheses,
     catalogue: Mapping[str, Effect],
     *,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[str], None],
 ) -> dict[str, Any]:
     """Return the next test for a diagnosis of strain, as ``tirelib-next-test/1``.
 
