@@ -15,13 +15,16 @@ if TYPE_CHECKING:
     from tirelib.core.arrays import FloatArray
     from tirelib.core.parameters import TireFile
     from tirelib.effects import Effect
-    from tirelib.inference.compare import Comparison, ForceComparison
+    from tirelib.inference.compare.forces import ForceComparison
+    from tirelib.inference.compare.strain import Comparison
     from tirelib.inference.diagnose.assess import Assessment, ForceAssessment
     from tirelib.inference.identify.whole import Whole
     from tirelib.report.simulation import Simulation
 
 QUANTITIES = ("strain", "Fy", "Fx", "Mz")
 """Measured quantities that a model explains."""
+BRUSH = ("bristle_lateral", "bristle_longitudinal", "friction")
+"""Numbers that a model of the brush states."""
 Progress = Callable[[str], None]
 
 
@@ -90,10 +93,16 @@ def compare(
     CalibrationError
         If the campaign does not hold the quantity, or the model does not predict it.
     """
-    from tirelib.inference.compare import compare as compare_model
+    from tirelib.inference.compare.forces import compare_forces
+    from tirelib.inference.compare.model import model_of
+    from tirelib.inference.compare.strain import compare_strain
+    from tirelib.measured.waveforms import measure_waveforms
 
     catalogue = _catalogue(effects)
-    return compare_model(campaign, model, quantity, effects=catalogue, progress=progress)
+    if explains_forces(quantity, campaign, model):
+        return compare_forces(campaign, model, quantity, catalogue)
+    waves = measure_waveforms(campaign, progress=progress)
+    return compare_strain(waves, model_of(model, catalogue), campaign.content_hash())
 
 
 def diagnose(
@@ -189,7 +198,7 @@ def add(
     from tirelib.inference.extend.additions import additions
     from tirelib.inference.extend.extension import known_effect
 
-    _check_quantity(quantity)
+    check_quantity(quantity)
     catalogue = _catalogue(effects)
     given = effect if isinstance(effect, Sequence) and not isinstance(effect, str) else [effect]
     chosen = [known_effect(e, catalogue) if isinstance(e, str) else e for e in given]
@@ -265,11 +274,10 @@ def explains_forces(quantity: str | None, campaign: "Campaign", model: "TireFile
         If strain is asked for and not measured, or is all that the campaign holds and the model has
         no ring.
     """
-    from tirelib.inference.compare.compare import needs_ring
     from tirelib.inference.identify.strain_notes import is_straight
 
     header = campaign.header
-    _check_quantity(quantity)
+    check_quantity(quantity)
     if quantity == "strain" and not header.gage_lateral:
         raise CalibrationError(
             f"{header.name}: it has no strain gages; look at its forces: --quantity "
@@ -277,13 +285,31 @@ def explains_forces(quantity: str | None, campaign: "Campaign", model: "TireFile
         )
     on_strain = quantity in ("strain", None) and bool(header.gage_lateral) and bool(model.missing)
     if on_strain and (quantity == "strain" or all(map(is_straight, campaign.plans))):
-        needs_ring(campaign, model)
+        _needs_ring(campaign, model)
     if quantity is None:
         return not header.gage_lateral or bool(model.missing)
     return quantity != "strain"
 
 
-def _check_quantity(quantity: str | None) -> None:
+def _needs_ring(campaign: "Campaign", model: "TireFile") -> None:
+    """Refuse to predict strain from a file that states no ring."""
+    name, brush = campaign.header.name, [key for key in BRUSH if key in model.numbers]
+    lacks = f"{len(model.missing)} numbers of the ring are missing ({', '.join(model.missing)})"
+    if brush:
+        raise CalibrationError(
+            f"{model.name}: it is a model of the brush only ({', '.join(brush)}) and says nothing "
+            f"of the strain of {name}: {lacks}; look at its forces in runs with slip, --quantity "
+            f"{', '.join(QUANTITIES[1:])}, or identify the ring from straight runs with `tirelib "
+            "identify`"
+        )
+    raise CalibrationError(
+        f"{model.name}: it states no complete ring, so it says nothing about the strain of {name}: "
+        f"{lacks}; identify the tire from straight runs with `tirelib identify`, or add them"
+    )
+
+
+def check_quantity(quantity: str | None) -> None:
+    """Raise ParameterError if there is no such quantity."""
     if quantity is not None and quantity not in QUANTITIES:
         raise ParameterError(
             f"--quantity {quantity}: allowed are {', '.join(QUANTITIES)}; correct the name"

@@ -8,8 +8,9 @@ import pytest
 from tests.chain.test_compare import strain_runs
 from tests.synthetic import header
 from tests.unit.inference.compare.compare_synthetic import model_file
+from tirelib import compare
 from tirelib.campaign import read_campaign, write_campaign
-from tirelib.inference.compare import Comparison, compare
+from tirelib.inference.compare.strain import Comparison
 from tirelib.report.comparison import write_comparison
 
 pytestmark = [pytest.mark.speed, pytest.mark.usefixtures("copies")]

@@ -11,12 +11,13 @@ from tirelib.cli.common import (
     NEW_FILE,
     NEW_FOLDER,
     output,
-    write_json,
+    say_written,
+    write_document,
 )
 from tirelib.cli.options import effects_option, json_option, model_option
 from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.core.errors import ParameterError
-from tirelib.journey import QUANTITIES
+from tirelib.journey import check_quantity
 
 if TYPE_CHECKING:
     from tirelib.core.parameters import TireFile
@@ -84,10 +85,7 @@ def add(
     json_file: Path | None,
 ) -> None:
     """Add effects to a model, fit it to CAMPAIGN and show how the error changes."""
-    if quantity is not None and quantity not in QUANTITIES:
-        raise ParameterError(
-            f"--quantity {quantity}: allowed are {', '.join(QUANTITIES)}; correct the name"
-        )
+    check_quantity(quantity)
     if undo:
         if effect_names or remove:
             raise ParameterError("--undo takes neither EFFECT nor --remove; leave them out")
@@ -107,26 +105,21 @@ def add(
 def _undo(model_name: str, out: Path, json_file: Path | None) -> None:
     from tirelib.core.parameters import read_tire, write_tire
     from tirelib.inference.extend.document import FORMAT as EXTENSION
+    from tirelib.inference.extend.document import told_history
     from tirelib.inference.extend.model_file import undone_file
 
     file, entry = undone_file(read_tire(model_name))
     write_tire(file, out, FORMAT)
-    console = output()
-    console.print(f"undone: {entry.get('action', 'add')} {entry.get('effect', '?')}")
-    console.print(f"written: {out}")
-    if json_file is not None:
-        history = [{k: v for k, v in e.items() if k != "before"} for e in file.extra["history"]]
-        write_json(
-            json_file,
-            {
-                "format": EXTENSION,
-                "action": "undo",
-                "effect": entry.get("effect"),
-                "effects": file.extra["effects"],
-                "history": history,
-            },
-        )
-        console.print(f"written: {json_file}")
+    output().print(f"undone: {entry.get('action', 'add')} {entry.get('effect', '?')}")
+    say_written(out)
+    document = {
+        "format": EXTENSION,
+        "action": "undo",
+        "effect": entry.get("effect"),
+        "effects": file.extra["effects"],
+        "history": told_history(file),
+    }
+    write_document(document, json_file)
 
 
 def _change(
@@ -173,18 +166,14 @@ def write_step(
     from tirelib.report.journey import write_extension
 
     write_tire(new, out, FORMAT)
-    console = output()
-    console.print(f"written: {out}")
+    say_written(out)
     if report is not None:
-        for path in write_extension(document, report):
-            console.print(f"written: {path}")
-    if json_file is not None:
-        write_json(json_file, document)
-        console.print(f"written: {json_file}")
+        say_written(*write_extension(document, report))
+    write_document(document, json_file)
 
 
 def _say(document: dict[str, Any]) -> None:
-    from tirelib.report.error_sentences import unmoved
+    from tirelib.report.error_sentences import fold_name, unmoved
     from tirelib.report.page import unit_name
 
     console = output()
@@ -207,22 +196,13 @@ def _say(document: dict[str, Any]) -> None:
         )
     for fold in document["held_out"]:
         console.print(
-            f"  {_left_out(fold)} left out: error {fold['error_before']:.3g} -> "
+            f"  {fold_name(fold)} left out: error {fold['error_before']:.3g} -> "
             f"{fold['error_after']:.3g}"
         )
     for line in unmoved(document):
         console.print(f"  {line}")
     for line in (*_warnings(document["flags"], *document["range"]), *document["messages"]):
         console.print(f"  {line}")
-
-
-def _left_out(fold: dict[str, Any]) -> str:
-    size = f"({fold['runs']} runs)" if "runs" in fold else f"({fold['points']} points)"
-    if fold["condition"] == "time":
-        return f"blocks of time, part {fold['value']:.0f} {size}"
-    if fold["condition"] == "cell":
-        return f"cells of conditions, part {fold['value']:.0f} {size}"
-    return f"{fold['condition']} {fold['value']:.4g} {fold['unit']} {size}"
 
 
 def _numbers(values: float | list[float]) -> str:

@@ -7,7 +7,6 @@ from typing import Any
 
 import click
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -16,6 +15,7 @@ from tirelib.cli.common import (
     CAMPAIGN,
     NEW_FILE,
     NEW_FOLDER,
+    new_table,
     output,
     write_json,
 )
@@ -276,14 +276,13 @@ def _print(console: Console, trained: Trained, document: dict[str, Any]) -> None
 
 def _regression_table(regressions: Sequence[Regression]) -> Table:
     """Every regression of the dissertation with its coefficients."""
-    table = Table(
+    table = new_table(
+        *("regression", "R2", "held out", "term", "coefficient", "std error", "p value"),
+        words=("regression", "term"),
         title="For comparison: the dissertation's regressions on the same runs (not used by "
         "estimate)",
-        box=SIMPLE_HEAD,
         title_justify="left",
     )
-    for column in ("regression", "R2", "held out", "term", "coefficient", "std error", "p value"):
-        table.add_column(column, justify="left" if column in ("regression", "term") else "right")
     for regression in regressions:
         error = f"{regression.cross_validated:.4g} {regression.unit}"
         first = (regression.name, f"{regression.r2:.4f}", error)
@@ -302,22 +301,15 @@ def _regression_table(regressions: Sequence[Regression]) -> Table:
 
 def _in_use_table(trained: Trained, in_use: dict[str, Any]) -> Table:
     """Error of each estimator on conditions that were held out."""
-    table = Table(
+    table = new_table(
+        *("quantity", "rmse", "unit", "R2", "runs", "terms"),
+        words=("quantity", "unit"),
         title="Error of the estimators (rms, with conditions held out)",
-        box=SIMPLE_HEAD,
         title_justify="left",
     )
-    for column in ("quantity", "rmse", "unit", "R2", "runs", "terms"):
-        table.add_column(column, justify="left" if column in ("quantity", "unit") else "right")
-    chain = trained.calibration.chains[-1]
-    models = {
-        "Fz": chain.load,
-        "kappa": chain.radius,
-        "Fy": chain.force,
-        "alpha": chain.angle.polynomial if chain.angle else None,
-    }
+    models = trained.calibration.chains[-1].polynomials
     for quantity in QUANTITIES:
-        entry, model = in_use[quantity], models[quantity]
+        entry, model = in_use[quantity], models.get(quantity)
         if entry is None or model is None:
             why = trained.links.refused.get(quantity, "")
             table.add_row(quantity, "not calibrated", "", "", "", why)
@@ -336,27 +328,16 @@ def _in_use_table(trained: Trained, in_use: dict[str, Any]) -> Table:
 
 def _held_out_table(rows: list[dict[str, Any]]) -> Table:
     """Worst rmse over the levels of each condition: the dissertation's and ours."""
-    table = Table(
+    table = new_table(
+        *("held out", "quantity", "dissertation", "in use", "flagged", "with these", "unit"),
+        "levels",
+        words=("held out", "quantity", "unit"),
         title="Worst held-out level inside the range of the others (rms error of the run means)",
-        box=SIMPLE_HEAD,
         title_justify="left",
         caption="in use: turns within the calibrated range; flagged: the largest share of a "
         "level's turns outside it; with these: rms error of all turns",
         caption_justify="left",
     )
-    for column in (
-        "held out",
-        "quantity",
-        "dissertation",
-        "in use",
-        "flagged",
-        "with these",
-        "unit",
-        "levels",
-    ):
-        table.add_column(
-            column, justify="left" if column in ("held out", "quantity", "unit") else "right"
-        )
     keys = dict.fromkeys((r["held_out"], r["quantity"]) for r in rows if r["inside"])
     for condition, quantity in keys:
         part = [r for r in rows if (r["held_out"], r["quantity"]) == (condition, quantity)]

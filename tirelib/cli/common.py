@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections.abc import Collection
 from difflib import get_close_matches
 from errno import ENOTDIR
 from math import isfinite
@@ -10,7 +11,9 @@ from tempfile import TemporaryFile
 from typing import Any
 
 import click
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.table import Table
 
 from tirelib.core.documents import plain as plain
 from tirelib.core.documents import write_json as write_json
@@ -130,6 +133,27 @@ NEW_FILE = NewPath(path_type=Path, dir_okay=False)
 NEW_FOLDER = NewPath(path_type=Path, file_okay=False)
 NEW_PLACE = NewPlace(path_type=Path, file_okay=False)
 WIDTH = 120
+
+
+def new_table(*headings: str, words: Collection[str], **look: Any) -> Table:
+    """Return an empty table; columns of words stand on the left, of numbers on the right."""
+    table = Table(box=SIMPLE_HEAD, **look)
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading in words else "right")
+    return table
+
+
+def say_written(*paths: Path | str) -> None:
+    """Say where files were written."""
+    for path in paths:
+        output().print(f"written: {path}")
+
+
+def write_document(document: dict[str, Any], *files: Path | None) -> None:
+    """Write a document into each file that is wanted, and say so."""
+    for file in filter(None, files):
+        write_json(file, document)
+        say_written(file)
 
 
 def output() -> Console:

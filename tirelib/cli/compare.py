@@ -11,14 +11,16 @@ from tirelib.cli.common import (
     NEW_FILE,
     NEW_FOLDER,
     output,
-    write_json,
+    say_written,
+    write_document,
 )
 from tirelib.cli.options import effects_option, json_option, model_option, quantity_option
 from tirelib.cli.progress import progress_bar, progress_options
 from tirelib.core.errors import ParameterError
 
 if TYPE_CHECKING:
-    from tirelib.inference.compare import Comparison, ForceComparison
+    from tirelib.inference.compare.forces import ForceComparison
+    from tirelib.inference.compare.strain import Comparison
 
 _EXAMPLE = """\b
 Examples:
@@ -79,7 +81,7 @@ def compare(
 ) -> None:
     """Compare a model with CAMPAIGN and show where it fails."""
     from tirelib.core.parameters import read_tire
-    from tirelib.inference.compare import compare as compare_model
+    from tirelib.journey import compare as compare_model
     from tirelib.model.registration import registered_effects
 
     catalogue = registered_effects(effect_files)
@@ -102,7 +104,7 @@ def compare(
     write_told(found, out, json_file)
     if data_file is not None:
         write_plot_data(data_file, data)
-        output().print(f"written: {data_file}")
+        say_written(data_file)
 
 
 def write_told(
@@ -116,15 +118,11 @@ def write_told(
     console.print(_answer(document))
     for line in (*document["statements"], *document["messages"]):
         console.print(f"  {line}")
-    targets = [path for path in (json_file, out and out / "comparison.json") if path]
     if out is not None:
         from tirelib.report.comparison import write_comparison
 
-        for path in write_comparison(found, out):
-            console.print(f"written: {path}")
-    for path in targets:
-        write_json(path, document)
-        console.print(f"written: {path}")
+        say_written(*write_comparison(found, out))
+    write_document(document, json_file, out and out / "comparison.json")
     return document
 
 

@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.campaign import Campaign, read_campaign
 from tirelib.cli.common import (
     CAMPAIGN,
+    new_table,
     output,
-    write_json,
+    say_written,
+    write_document,
 )
 from tirelib.cli.options import (
     effects_option,
@@ -95,16 +96,11 @@ def write_told(
 
     document["explanation"] = explained(document, model_name, str(folder), effect_files)._asdict()
     _say(document, titled(document["explanation"]))
-    console = output()
-    targets = [path for path in (json_file, out and out / "diagnosis.json") if path]
     if out is not None:
         from tirelib.report.diagnosis import write_diagnosis
 
-        for path in write_diagnosis(told, document, out, file.extra.get("history", [])):
-            console.print(f"written: {path}")
-    for path in targets:
-        write_json(path, document)
-        console.print(f"written: {path}")
+        say_written(*write_diagnosis(told, document, out, file.extra.get("history", [])))
+    write_document(document, json_file, out and out / "diagnosis.json")
 
 
 def diagnosed(
@@ -169,24 +165,13 @@ def _table(document: dict[str, Any]) -> Table:
         for place, entry in enumerate(every)
         if place < SHOWN or mark_of(document, entry) != entry["level"]
     ]
-    table = Table(box=SIMPLE_HEAD)
-    longest = max((len(entry["effect"]) for entry in candidates), default=0)
-    for column in (
-        "effect",
-        "level",
-        "score / threshold",
-        "strength",
-        "std",
-        "unit",
-        "in range",
-        "error after",
-        "held out",
-        "twins",
-    ):
-        words = column in ("effect", "level", "unit", "in range", "twins")
-        # a name that is cut short cannot be added
-        width = longest if column == "effect" else None
-        table.add_column(column, justify="left" if words else "right", min_width=width)
+    table = new_table(
+        *("effect", "level", "score / threshold", "strength", "std", "unit", "in range"),
+        *("error after", "held out", "twins"),
+        words=("effect", "level", "unit", "in range", "twins"),
+    )
+    # a name that is cut short cannot be added
+    table.columns[0].min_width = max((len(entry["effect"]) for entry in candidates), default=0)
     for entry in candidates:
         held = entry["heldout_error_after"]
         table.add_row(

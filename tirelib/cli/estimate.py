@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from tirelib.campaign import read_campaign
@@ -16,8 +15,10 @@ from tirelib.cli.common import (
     FILE,
     NEW_FILE,
     NEW_FOLDER,
+    new_table,
     output,
-    write_json,
+    say_written,
+    write_document,
 )
 from tirelib.cli.limits import extrapolated, not_checked, not_given, outside, weakly_checked
 from tirelib.cli.options import json_option
@@ -111,20 +112,17 @@ def estimate(
     estimates = calibration.estimate(observations.features)
     costs = costs_of(calibration, observations.features, estimates)
     document = estimate_document(observations, estimates, calibration, costs)
-    console = output()
     print_document(campaign.header.name, document, calibration)
     if table is not None:
         with TurnTable(table, file_hash(calibration_file)) as turns:
             turns.write("", observations.run, observations.features, estimates)
-        console.print(f"written: {table}")
-    if json_file is not None:
-        write_json(json_file, document)
-        console.print(f"written: {json_file}")
+        say_written(table)
+    write_document(document, json_file)
     if report is not None:
         from tirelib.report.estimate import write_estimate_report
 
         page = write_estimate_report(observations, estimates, calibration, report)
-        console.print(f"written: {page}")
+        say_written(page)
     context.exit(exit_code(document))
 
 
@@ -171,9 +169,7 @@ def _estimate_recording(
                 f"    another tire? {other['turns']} of {other['judged']} turns in range have a "
                 f"strain pattern that the calibrated {calibration.tire!r} does not show"
             )
-    for path in (table, json_file):
-        if path is not None:
-            console.print(f"written: {path}")
+    say_written(*filter(None, (table, json_file)))
     return document
 
 
@@ -217,9 +213,10 @@ def print_document(name: str, document: dict[str, Any], calibration: Calibration
 
 
 def _summary_table(summary: dict[str, Any]) -> Table:
-    table = Table(box=SIMPLE_HEAD)
-    for column in ("quantity", "rmse", "unit", "% of range", "R2", "runs", "in 95 % interval"):
-        table.add_column(column, justify="left" if column in ("quantity", "unit") else "right")
+    table = new_table(
+        *("quantity", "rmse", "unit", "% of range", "R2", "runs", "in 95 % interval"),
+        words=("quantity", "unit"),
+    )
     for quantity, entry in summary.items():
         if entry is None:
             table.add_row(quantity, "not calibrated", *[""] * 5)

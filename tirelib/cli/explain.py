@@ -18,12 +18,13 @@ from tirelib.cli.common import (
     NEW_FOLDER,
     output,
     plain,
-    write_json,
+    say_written,
+    write_document,
 )
 from tirelib.cli.options import effects_option, json_option, quantity_option
 from tirelib.cli.progress import chosen_words, progress_bar, progress_options
-from tirelib.core.errors import CalibrationError, ParameterError, TirelibError
-from tirelib.journey import QUANTITIES, explains_forces
+from tirelib.core.errors import CalibrationError, TirelibError
+from tirelib.journey import check_quantity, explains_forces
 
 if TYPE_CHECKING:
     from tirelib.core.parameters import TireFile
@@ -85,10 +86,7 @@ def explain(
     from tirelib.report.explanation import titled
     from tirelib.report.journey import write_journey
 
-    if quantity is not None and quantity not in QUANTITIES:
-        raise ParameterError(
-            f"--quantity {quantity}: allowed are {', '.join(QUANTITIES)}; correct the name"
-        )
+    check_quantity(quantity)
     steps = Steps(folder, out, effect_files)  # faults of the campaign are said before files
     out.mkdir(parents=True, exist_ok=True)
     journey = steps.walk(model_name, quantity)
@@ -99,12 +97,8 @@ def explain(
         console.print(f"  {what}: {said}")
     for line in document["messages"]:
         console.print(f"  {line}")
-    for path in write_journey(journey, out):
-        console.print(f"written: {path}")
-    for target in (json_file, out / "explanation.json"):
-        if target is not None:
-            write_json(target, dict(document))
-            console.print(f"written: {target}")
+    say_written(*write_journey(journey, out))
+    write_document(dict(document), json_file, out / "explanation.json")
 
 
 class Steps:

@@ -1,11 +1,12 @@
 """``tirelib export``: the forces of a model or of a campaign as a Magic Formula file."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from tirelib.cli.common import NEW_FILE, Real, output, write_json
+from tirelib.cli.common import NEW_FILE, Real, output, say_written, write_document
 from tirelib.cli.options import effects_option, json_option
 from tirelib.core.documents import new_file
 from tirelib.core.errors import CalibrationError
@@ -111,12 +112,9 @@ def export(
         fit = fit_magic(points, radius=unloaded, nominal_load=model.reference[0])
     with new_file(tir_file):
         write_tir(tir_of(fit, what), tir_file)
-    console = output()
-    console.print("\n".join(words(fit, what)))
-    console.print(f"written: {tir_file}")
-    if json_file is not None:
-        write_json(json_file, _document(fit, what))
-        console.print(f"written: {json_file}")
+    output().print("\n".join(words(fit, what)))
+    say_written(tir_file)
+    write_document(_document(fit, what), json_file)
 
 
 def _free_radius(file: "TireFile") -> float:
@@ -133,13 +131,7 @@ def _document(fit: "MagicFit", what: str) -> dict[str, object]:
         "format": FORMAT,
         "source": what,
         "errors": {
-            name: {
-                "rms": error.rms,
-                "largest": error.largest,
-                "peak": error.peak,
-                "points": error.points,
-                "unit": "N m" if name == "Mz" else "N",
-            }
+            name: asdict(error) | {"unit": "N m" if name == "Mz" else "N"}
             for name, error in fit.errors.items()
         },
         "range_SI": {name: list(ends) for name, ends in fit.tire.limits.items()},

@@ -14,7 +14,7 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from tirelib.cli.common import NEW_PLACE, Whole, output, write_json
+from tirelib.cli.common import NEW_PLACE, Whole, output, say_written, write_document
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import EVERY
 from tirelib.core.errors import TirelibError
@@ -172,12 +172,10 @@ def fleet(
         stopped = str(lost)
     _print(console, task, counts, engine.causes(counts))
     try:
-        console.print(f"written: {write_fleet_page(data)}")
+        say_written(write_fleet_page(data))
     except TirelibError as error:
         click.echo(f"Warning: no page: {error}", err=True)
-    if json_file is not None:
-        write_json(json_file, _document(task, str(out), counts))
-        console.print(f"written: {json_file}")
+    write_document(_document(task, str(out), counts), json_file)
     if stopped:
         click.echo(f"Error: {stopped}", err=True)
     context.exit(1 if counts.failed or counts.negative or stopped else 0)

@@ -8,7 +8,17 @@ from typing import Any
 import click
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, NEW_FILE, NEW_FOLDER, Real, Whole, output, write_json
+from tirelib.cli.common import (
+    CAMPAIGN,
+    FILE,
+    NEW_FILE,
+    NEW_FOLDER,
+    Real,
+    Whole,
+    output,
+    say_written,
+    write_document,
+)
 from tirelib.cli.estimate import exit_code, print_document
 from tirelib.cli.fmu_virtual import measure, virtual
 from tirelib.cli.options import json_option
@@ -230,9 +240,7 @@ def run(context: click.Context, file: Path, folder: Path, json_file: Path | None
     print_document(campaign.header.name, document, own)
     for text in told:
         output().print(f"log of the FMU: {text}", markup=False)
-    if json_file is not None:
-        write_json(json_file, document)
-        output().print(f"written: {json_file}")
+    write_document(document, json_file)
     context.exit(exit_code(document))
 
 
@@ -259,10 +267,8 @@ def check(
     with progress_bar("checking", 3) as progress:
         document = check_fmu(file, reference=reference, progress=progress)
     _print_check(document)
-    if json_file is not None:
-        kept = {name: part for name, part in document.items() if name not in ("curves", "units")}
-        write_json(json_file, kept)
-        output().print(f"written: {json_file}")
+    kept = {name: part for name, part in document.items() if name not in ("curves", "units")}
+    write_document(kept, json_file)
     if out is not None:
         from tirelib.report.fmu_check import write_check
 
@@ -272,7 +278,7 @@ def check(
             raise FormatError(
                 f"{out}: cannot be written ({error.strerror}); choose another folder"
             ) from None
-        output().print(f"written: {page}")
+        say_written(page)
     context.exit(0 if document["passed"] else 1)
 
 

@@ -7,12 +7,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
 from tirelib.campaign import Campaign, read_campaign
-from tirelib.cli.common import CAMPAIGN, NEW_FILE, NEW_FOLDER, output, write_json
+from tirelib.cli.common import (
+    CAMPAIGN,
+    NEW_FILE,
+    NEW_FOLDER,
+    new_table,
+    output,
+    say_written,
+    write_document,
+)
 from tirelib.cli.options import json_option
 from tirelib.cli.progress import is_verbose, progress_bar, progress_options
 
@@ -129,10 +136,8 @@ def identify(
     for reason in document["reasons"]:
         if reason not in warned:
             console.print(f"  {reason}")
-    console.print(f"written: {out}")
-    if json_file is not None:
-        write_json(json_file, document)
-        console.print(f"written: {json_file}")
+    say_written(out)
+    write_document(document, json_file)
     following = [
         shlex.join(["tirelib", verb, str(folder), "--model", str(out), "--out", f"{verb}d"])
         for verb in ("compare", "diagnose")
@@ -140,8 +145,7 @@ def identify(
     if report is not None:
         from tirelib.report.identification import write_identification
 
-        for path in write_identification(document, report, commands=following):
-            console.print(f"written: {path}")
+        say_written(*write_identification(document, report, commands=following))
     console.print(f"next: {following[0]}")
     console.print(f"      {following[1]}")
     brush = document["brush"]
@@ -193,10 +197,10 @@ def _say_brush(console: Console, document: dict[str, Any]) -> None:
         f"{document['campaign']}: brush fitted to {forces['points']} points; residuals: {left}"
     )
     _say_parameters(console, brush["parameters"])
-    table = Table(box=SIMPLE_HEAD)
-    for column in ("stiffness over", "load N", "bar", "value", "95 % from", "to", "unit"):
-        words = column in ("stiffness over", "unit")
-        table.add_column(column, justify="left" if words else "right")
+    table = new_table(
+        *("stiffness over", "load N", "bar", "value", "95 % from", "to", "unit"),
+        words=("stiffness over", "unit"),
+    )
     for entry in brush["stiffness"]:
         bar = entry["pressure_bar"]
         table.add_row(
@@ -222,10 +226,9 @@ def _say_pressure(console: Console, found: dict[str, Any]) -> None:
         "lateral force with the ring's pressure and with a parabola, rms error in N (held-out "
         "points in brackets)"
     )
-    table = Table(box=SIMPLE_HEAD)
-    for column in ("by", "from", "to", "points", "ring", "parabola", "better"):
-        words = column in ("by", "better")
-        table.add_column(column, justify="left" if words else "right")
+    table = new_table(
+        *("by", "from", "to", "points", "ring", "parabola", "better"), words=("by", "better")
+    )
     for row in found["table"]:
         ends = ("", "") if row["by"] == "all" else (f"{row['low']:.4g}", f"{row['high']:.4g}")
         unit = f" {row['range_unit']}" if row["range_unit"] else ""
@@ -266,10 +269,10 @@ def _say_parameters(console: Console, parameters: list[dict[str, Any]]) -> None:
 
 
 def _table(parameters: list[dict[str, Any]]) -> Table:
-    table = Table(box=SIMPLE_HEAD)
-    for column in ("parameter", "value", "95 % from", "to", "unit", "flags"):
-        words = column in ("parameter", "unit", "flags")
-        table.add_column(column, justify="left" if words else "right")
+    table = new_table(
+        *("parameter", "value", "95 % from", "to", "unit", "flags"),
+        words=("parameter", "unit", "flags"),
+    )
     for entry in parameters:
         table.add_row(
             entry["name"],

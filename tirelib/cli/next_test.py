@@ -5,11 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, FILE, Real, output, write_json
+from tirelib.cli.common import CAMPAIGN, FILE, Real, new_table, output, say_written, write_document
 from tirelib.cli.diagnose import diagnosed
 from tirelib.cli.diagnosis_file import belongs, read_diagnosis
 from tirelib.cli.options import (
@@ -271,21 +269,14 @@ def _for_force(
     return document, plan
 
 
-def _give(
-    document: dict[str, Any], plan: "Plan | None", out: Path | None, json_file: Path | None
-) -> None:
-    """Print and write an answer; a page where there is a plan."""
+def _give(document: dict[str, Any], plan: "Plan", out: Path | None, json_file: Path | None) -> None:
+    """Print an answer, and write it and its page."""
     _say(document)
-    console = output()
-    targets = [path for path in (json_file, out and out / "next_test.json") if path]
-    if out is not None and plan is not None:
+    if out is not None:
         from tirelib.report.next_test import write_next_test
 
-        for path in write_next_test(plan, out):
-            console.print(f"written: {path}")
-    for path in targets:
-        write_json(path, document)
-        console.print(f"written: {path}")
+        say_written(*write_next_test(plan, out))
+    write_document(document, json_file, out and out / "next_test.json")
 
 
 def _si(name: str, given: tuple[float, float] | None) -> "Range | None":
@@ -335,13 +326,13 @@ def _say(document: dict[str, Any]) -> None:
     candidates = document["candidates"]
     if max((entry["separation"] for entry in candidates), default=0.0) < LEAST_SEPARATION:
         return
-    table = Table(box=SIMPLE_HEAD)
     axes = [axis for axis in AXES.values() if axis.key in candidates[0]]
     idle = _idle(candidates, [axis.key for axis in axes])
-    columns = [axis.quantity.heading for axis in axes]
-    for column in (*columns, "separation (chi-square)", "chance to resolve"):
-        table.add_column(column, justify="right")
-    table.add_column("hardest pair")
+    table = new_table(
+        *(axis.quantity.heading for axis in axes),
+        *("separation (chi-square)", "chance to resolve", "hardest pair"),
+        words=("hardest pair",),
+    )
     rows = [
         (
             *["any" if axis.key in idle else _condition(entry, axis) for axis in axes],

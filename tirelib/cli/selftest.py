@@ -4,11 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
 from tirelib.campaign import read_campaign
-from tirelib.cli.common import CAMPAIGN, Real, Whole, output, write_json
+from tirelib.cli.common import CAMPAIGN, Real, Whole, new_table, output, say_written, write_document
 from tirelib.cli.options import (
     effects_option,
     false_alarm_option,
@@ -108,16 +106,11 @@ def selftest(
         )
     document = selftest_document(found) | error_of(runs, model).told
     _say(document)
-    console = output()
-    targets = [path for path in (json_file, out and out / "selftest.json") if path]
     if out is not None:
         from tirelib.report.selftest import write_selftest
 
-        for path in write_selftest(document, out):
-            console.print(f"written: {path}")
-    for path in targets:
-        write_json(path, document)
-        console.print(f"written: {path}")
+        say_written(*write_selftest(document, out))
+    write_document(document, json_file, out and out / "selftest.json")
 
 
 def _only(names: str | None, has: list[str], catalogue: Any) -> list[str]:
@@ -158,13 +151,8 @@ def _say(document: dict[str, Any]) -> None:
     console.print(
         f"  nothing planted: false alarm in {100 * alarms['share']:.0f} % of {alarms['n']} tires"
     )
-    table = Table(box=SIMPLE_HEAD)
-    table.add_column("effect")
-    for ratio in document["ratios"]:
-        table.add_column(f"at {ratio:g}", justify="right")
-        table.add_column("in a set", justify="right")
-    table.add_column("end of range", justify="right")
-    table.add_column("twins")
+    chances = [heading for x in document["ratios"] for heading in (f"at {x:g}", "in a set")]
+    table = new_table("effect", *chances, "end of range", "twins", words=("effect", "twins"))
     for entry in document["effects"]:
         cells: list[str] = []
         for result in entry["results"]:

@@ -7,10 +7,8 @@ from typing import Any
 
 import click
 import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
-from tirelib.cli.common import NEW_FOLDER, Real, output, write_json
+from tirelib.cli.common import NEW_FOLDER, Real, new_table, output, say_written, write_json
 from tirelib.cli.options import effects_option, json_option
 from tirelib.core.arrays import FloatArray
 from tirelib.core.errors import ParameterError
@@ -201,8 +199,7 @@ def simulate(
     document = _document(file, model, done, notes, chosen) if targets else {}
     for target in targets:
         write_json(target, document)
-    for path in written:
-        output().print(f"written: {path}")
+    say_written(*written)
 
 
 def _model(
@@ -289,9 +286,8 @@ def _print(file: TireFile, done: Simulation, notes: Sequence[str]) -> None:
         console.print(f"note: {note}")
     points = [point_document(done, point) for point in range(len(done))]
     for columns in _TABLES:
-        table = Table(box=SIMPLE_HEAD)
-        for title in ("point", *columns):
-            table.add_column(title.replace(" [", "\n["), justify="right")
+        headings = (title.replace(" [", "\n[") for title in columns)
+        table = new_table("point", *headings, words=())
         for number, point in enumerate(points):
             table.add_row(str(number), *(read(point) for read in columns.values()))
         console.print(table)

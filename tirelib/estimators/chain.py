@@ -89,14 +89,19 @@ class Chain:
 
     def has(self, quantity: str) -> bool:
         """Tell whether a quantity is calibrated."""
-        model = {"Fz": self.load, "kappa": self.radius, "Fy": self.force, "alpha": self.angle}
-        return model[quantity] is not None
+        return quantity in self.polynomials
+
+    @property
+    def polynomials(self) -> dict[str, Polynomial]:
+        """The polynomial of each calibrated quantity; that of kappa gives the rolling radius."""
+        angle = self.angle.polynomial if self.angle else None
+        every = {"Fz": self.load, "alpha": angle, "kappa": self.radius, "Fy": self.force}
+        return {quantity: model for quantity, model in every.items() if model is not None}
 
     @property
     def needed(self) -> tuple[str, ...]:
         """Conditions that its models use, without which they say nothing."""
-        models = [self.load, self.force, self.angle.polynomial if self.angle else None]
-        used = {v.name for model in models if model is not None for v in model.variables}
+        used = {v.name for k, p in self.polynomials.items() if k != "kappa" for v in p.variables}
         sources = {"pressure": "pressure", "camber": "camber", "speed_squared": "speed"}
         return tuple(source for name, source in sources.items() if name in used)
 

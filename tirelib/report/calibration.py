@@ -28,7 +28,7 @@ def write_calibration_report(
     trained: Trained,
     folder: str | Path,
     *,
-    held_out: Sequence[Mapping[str, Any]] = (),
+    held_out: Sequence[Mapping[str, Any]],
 ) -> Path:
     """Write ``index.html`` and its figures.
 

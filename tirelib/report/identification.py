@@ -18,7 +18,7 @@ WIDEST = 100.0
 
 
 def write_identification(
-    document: Mapping[str, Any], folder: Path, *, commands: Sequence[str] = ()
+    document: Mapping[str, Any], folder: Path, *, commands: Sequence[str]
 ) -> tuple[Path, Path]:
     """Write ``identification.html`` and ``.md`` of a ``tirelib-identification/1``.
 

@@ -16,6 +16,7 @@ from tirelib.core.errors import ParameterError
 from tirelib.core.parameters import FIELDS, Tire
 from tirelib.core.threads import one_thread
 from tirelib.core.units import from_si
+from tirelib.measured.features.peaks import peak
 from tirelib.physics.contact import radial, shear
 from tirelib.physics.contact.free_boundary import ComplianceAt
 from tirelib.physics.contact.radial import RadialContact
@@ -28,7 +29,6 @@ from tirelib.report.simulation_series import (
     FINE_ANGLES_PER_ANGLE,
     N_SERIES,
     Peaks,
-    extreme,
     find_peaks,
     fine_grid,
     long_series,
@@ -124,7 +124,8 @@ class Simulation:
     @property
     def largest_pressure(self) -> FloatArray:
         """Largest pressure, by a parabola through three angles, [N/m], shape (n_points,)."""
-        return extreme(self.phi, self.pressure)[1]
+        turn = np.ones(self.phi.size, dtype=np.bool_)
+        return peak(self.pressure, turn, float(self.phi[0]), 1.0)[1]
 
     @property
     def peaks(self) -> Peaks:

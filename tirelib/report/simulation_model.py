@@ -16,6 +16,7 @@ from tirelib.core.parameters import FIELDS, Tire
 from tirelib.core.threads import one_thread
 from tirelib.effects.state import Operating, State
 from tirelib.inference.compare.model import TireModel
+from tirelib.inference.identify.random_effects import angle_slope
 from tirelib.measured.signal import LowPass
 from tirelib.model.base import predict
 from tirelib.model.solution import Solution, solved
@@ -184,7 +185,7 @@ def _simulation(
 ) -> Simulation:
     """Return the curves of a solved model, their first value at the end as well."""
     u, v, pressure, up, along, strain, gage, rate = (
-        np.concatenate([x, x[:, :1]], axis=1) for x in (*curves, _slope(curves.strain))
+        np.concatenate([x, x[:, :1]], axis=1) for x in (*curves, angle_slope(curves.strain))
     )
     middles = zip(edges.mean(axis=1), pressure, strict=True)
     return Simulation(
@@ -207,12 +208,3 @@ def _simulation(
         rate,
         gage=gage,
     )
-
-
-def _slope(values: FloatArray) -> FloatArray:
-    """Return the derivative by angle of periodic curves (n_points, n)."""
-    n = values.shape[-1]
-    order = 1j * np.fft.rfftfreq(n, 1.0 / n)
-    order[-1] = 0.0
-    out: FloatArray = np.fft.irfft(np.fft.rfft(values) * order, n=n)
-    return out

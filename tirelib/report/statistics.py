@@ -76,23 +76,11 @@ def _side_by_side(regressions: Sequence[Regression]) -> Table:
     )
 
 
-def models(trained: Trained) -> dict[str, Polynomial]:
-    """Return the polynomial of each calibrated quantity (for kappa: of the rolling radius)."""
-    chain = trained.calibration.chains[-1]
-    found = {
-        "Fz": chain.load,
-        "alpha": chain.angle.polynomial if chain.angle else None,
-        "kappa": chain.radius,
-        "Fy": chain.force,
-    }
-    return {quantity: model for quantity, model in found.items() if model is not None}
-
-
 def in_use_table(trained: Trained) -> Table:
     """Return one row per quantity: held-out error, R2, terms, and the dissertation's beside it."""
     rows = []
     angle = trained.links.truth["slip_angle"]
-    for quantity, model in models(trained).items():
+    for quantity, model in trained.calibration.chains[-1].polynomials.items():
         held = in_use(trained, quantity)
         if held is None:
             continue
@@ -130,7 +118,7 @@ def estimator_tables(trained: Trained) -> list[Table]:
     """Return coefficients, regressors and candidates of every estimator in use, folded."""
     return [
         table
-        for quantity, model in models(trained).items()
+        for quantity, model in trained.calibration.chains[-1].polynomials.items()
         for table in (
             _coefficients(quantity, model),
             _regressors(trained, quantity, model),

@@ -17,7 +17,8 @@ from tirelib.campaign import read_campaign
 from tirelib.core.threads import VARIABLES, one_thread
 from tirelib.estimators.chain import Chain
 from tirelib.estimators.train import train
-from tirelib.inference.compare.compare import compare
+from tirelib.inference.compare.forces import compare_forces
+from tirelib.inference.compare.strain import compare_strain
 from tirelib.inference.diagnose.diagnose import diagnose
 from tirelib.inference.diagnose.forces.diagnose import diagnose_force
 from tirelib.inference.extend.extension import extended, without_effect
@@ -87,7 +88,8 @@ class Asked:
         (identify, 1, ()),
         (identify_whole, 1, ()),
         (identify_forces, 1, ()),
-        (compare, 2, ()),
+        (compare_forces, 2, ()),
+        (compare_strain, 2, ()),
         (diagnose, 3, ()),
         (diagnose_force, 2, ()),
         (extended, 3, ()),

@@ -7,14 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from tirelib.core.errors import FormatError, ParameterError
 from tirelib.core.parameters import Tire, read_tire
 from tirelib.report.simulation import LARGEST_BELT_SPEED, Simulation, simulate
 from tirelib.report.simulation_document import columns, point_document, write_curves
-from tirelib.report.simulation_series import extreme
 
 TIRE = read_tire("table-6-1").tire
 CONTACTS = pytest.mark.parametrize("contact", ["radial", "shear"])
@@ -212,25 +209,6 @@ def test_the_speed_limit_is_the_belts_so_that_a_small_wheel_may_turn_faster() ->
     assert simulate(kart, load=600.0, turn_rate=400.0).load[0] > 0.0
     with pytest.raises(ParameterError, match="0 to 1200 rad/s"):
         simulate(kart, load=600.0, turn_rate=1201.0)
-
-
-@given(place=st.floats(-0.9, 0.9), height=st.floats(-5.0, 5.0), bend=st.floats(0.1, 10.0))
-def test_the_top_of_a_parabola_is_found_between_the_samples(
-    place: float, height: float, bend: float
-) -> None:
-    phi = np.linspace(-1.0, 1.0, 41)
-    angle, value = extreme(phi, height - bend * (phi - place) ** 2)
-    assert angle == pytest.approx(place, abs=1e-9)
-    assert value == pytest.approx(height, abs=1e-9)
-
-
-def test_a_maximum_at_the_end_or_beside_a_gap_is_the_sample() -> None:
-    phi = np.linspace(0.0, 1.0, 11)
-    assert [float(x) for x in extreme(phi, phi)] == [1.0, 1.0]
-    gap = np.where(phi > 0.45, -np.inf, phi)
-    angle, value = extreme(phi, gap)
-    assert float(angle) == pytest.approx(0.4)
-    assert float(value) == pytest.approx(0.4)
 
 
 def test_curves_come_back_from_the_file(rolling: Simulation, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from tirelib.core.arrays import FloatArray, IntArray, rms
 from tirelib.inference.compare.force_model import slip_of
 from tirelib.inference.compare.forces import ForceComparison
-from tirelib.inference.compare.sentences import told
+from tirelib.inference.compare.sentences import set_point, told
 from tirelib.inference.identify.error_bands import levels
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.inference.identify.force_points import CELL_ANGLE, CELL_RATIO
@@ -79,9 +79,9 @@ def curves_of(found: ForceComparison) -> tuple[Curve, ...]:
             float(getattr(data, name)[member].mean()) for name in ("load", "pressure")
         )
         angle = float(key[2] * CELL_ANGLE)
-        words = told("load", 50.0 * round(load / 50.0)) if np.isfinite(load) else "load unknown"
+        words = set_point("load", load) if np.isfinite(load) else "load unknown"
         if several[1] and np.isfinite(pressure):
-            words += f", {told('pressure', 5e3 * round(pressure / 5e3))}"
+            words += f", {set_point('pressure', pressure)}"
         if several[2]:
             words += f", camber {told('camber', angle)}"
         left = rms(found.difference[member])

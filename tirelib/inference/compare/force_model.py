@@ -8,7 +8,7 @@ import numpy as np
 
 from tirelib.campaign import Campaign
 from tirelib.core.arrays import FloatArray
-from tirelib.core.errors import CalibrationError, FormatError, ParameterError
+from tirelib.core.errors import CalibrationError, FormatError
 from tirelib.core.parameters import TireFile
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.inference.compare.model import TireModel, UsedEffect, effects_of
@@ -116,15 +116,9 @@ def quantities_of(campaign: Campaign, points: ForcePoints, quantity: str | None)
 
     Raises
     ------
-    ParameterError
-        If the quantity is no force.
     CalibrationError
         If it is not measured.
     """
-    if quantity is not None and quantity not in FORCES:
-        raise ParameterError(
-            f"--quantity {quantity}: allowed are strain, {', '.join(FORCES)}; correct the name"
-        )
     data = points.data
     measured = [name for name in FORCES if np.isfinite(getattr(data, name)).any()]
     slipping = [name for name in measured if slips(data, name)]

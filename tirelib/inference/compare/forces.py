@@ -17,6 +17,7 @@ from tirelib.campaign import Campaign
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray, rms
 from tirelib.core.parameters import TireFile
 from tirelib.core.quantities import QUANTITIES
+from tirelib.core.threads import one_thread
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.inference.compare.error import last_floor
 from tirelib.inference.compare.force_model import (
@@ -29,7 +30,7 @@ from tirelib.inference.compare.force_model import (
     usable_points,
 )
 from tirelib.inference.compare.model import UsedEffect
-from tirelib.inference.compare.sentences import told
+from tirelib.inference.compare.sentences import set_point, told
 from tirelib.inference.compare.strain import verdict_of
 from tirelib.inference.identify.error_bands import levels
 from tirelib.inference.identify.force_data import ForceData, force_data
@@ -46,7 +47,6 @@ CELLS = (
     "cells of 0.5 deg in slip angle and camber, 0.01 in slip ratio, a tenth in load, pressure and "
     "speed, 5 K in tread temperature"
 )
-UNITS = {name: QUANTITIES[name].unit for name in ("Fy", "Fx", "Mz")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +160,7 @@ class ForceComparison:
         return np.asarray(self.predicted - self.measured)
 
 
+@one_thread()
 def compare_forces(
     campaign: Campaign,
     file: TireFile,
@@ -316,7 +317,7 @@ def _say(name: str, cell: ForceCell) -> str:
         return (
             f"At camber {range_of(cell)} the model's {name} is shifted by "
             f"{'-' if cell.shift < 0.0 else '+'}{_short(abs(cell.shift))} "
-            f"± {_short(1.96 * cell.excess_std)} {UNITS[name]} where camber is "
+            f"± {_short(1.96 * cell.excess_std)} {QUANTITIES[name].unit} where camber is "
             f"positive, and the other way where it is negative (95 %, {cell.points} points)."
         )
     kind = cell.by.replace("_", " ")
@@ -324,8 +325,8 @@ def _say(name: str, cell: ForceCell) -> str:
     sign = ", either sign, " if cell.by in SLIP_LIMITS else ", "
     return (
         f"At {kind} {range_of(cell)}{sign}the model's {name} is {_short(abs(cell.excess))} "
-        f"\N{PLUS-MINUS SIGN} {_short(1.96 * cell.excess_std)} {UNITS[name]} too {size} in size "
-        f"(95 %, {cell.points} points)."
+        f"\N{PLUS-MINUS SIGN} {_short(1.96 * cell.excess_std)} {QUANTITIES[name].unit} "
+        f"too {size} in size (95 %, {cell.points} points)."
     )
 
 
@@ -334,8 +335,7 @@ def range_of(cell: ForceCell) -> str:
     if cell.by == "all":
         return ""
     if cell.by in ("load", "pressure") and cell.high < 1.1 * cell.low:
-        step = 50.0 if cell.by == "load" else 5e3
-        return told(cell.by, step * round(0.5 * (cell.low + cell.high) / step))
+        return set_point(cell.by, 0.5 * (cell.low + cell.high))
     grain = float(np.deg2rad(0.1)) if cell.by in ("slip_angle", "camber") else 0.001
     if cell.by in ("load", "pressure"):
         grain = 1.0
@@ -361,8 +361,8 @@ def _messages(
     if not repeats:
         out.append(
             f"{where} repeats no condition ({CELLS}): the noise is unknown, so errors are given in "
-            f"{UNITS[name]}, and whether they exceed the noise is open. Repeat three conditions or "
-            "more."
+            f"{QUANTITIES[name].unit}, and whether they exceed the noise is open. Repeat three "
+            "conditions or more."
         )
     elif points.sweep.any():
         out.append(

@@ -11,7 +11,7 @@ from tirelib.inference.identify.campaign_data import TYPICAL_TOLERANCE, usable, 
 from tirelib.inference.identify.error_bands import levels
 from tirelib.measured.waveforms import Waveforms
 
-_STEP = {"load": 50.0, "pressure": 5e3, "speed": 1.0 / 3.6}
+STEP = {"load": 50.0, "pressure": 5e3, "speed": 1.0 / 3.6}
 """To what levels are rounded: 50 N, 0.05 bar, 1 km/h."""
 _SLIP_STEP = {
     "slip_angle": float(np.deg2rad(0.5)),
@@ -122,7 +122,7 @@ def _factors(waves: Waveforms, straight: BoolArray) -> tuple[Factor, ...]:
         level = levels(np.where(straight, c[measured], np.nan))
         if level.max() > 0:
             values = np.array([c[measured][level == k].mean() for k in range(level.max() + 1)])
-            out.append(Factor(name, level, np.round(values / _STEP[name]) * _STEP[name]))
+            out.append(Factor(name, level, np.round(values / STEP[name]) * STEP[name]))
     for name, step in _SLIP_STEP.items():
         rounded = np.round(np.nan_to_num(c[name]) / step)
         found, level = np.unique(rounded, return_inverse=True)

@@ -5,6 +5,7 @@ import numpy as np
 from tirelib.core.arrays import FloatArray
 from tirelib.core.quantities import QUANTITIES
 from tirelib.inference.compare.regions import SLIPS, Region
+from tirelib.inference.compare.runs import STEP
 from tirelib.inference.compare.sectors import SECTORS, sector_at
 
 PLACES = {
@@ -37,6 +38,17 @@ def told(by: str, value: float) -> str:
     number = quantity.told(value)
     text = f"{number:,.0f}" if by in ("load", "speed") else f"{round(float(number), 3):g}"
     return f"{text} {quantity.words}".strip()
+
+
+def set_point(by: str, value: float) -> str:
+    """Say the level of a load, a pressure or a speed.
+
+    Examples
+    --------
+    >>> set_point("load", 4488.0), set_point("pressure", 1.68e5)
+    ('4,500 N', '1.7 bar')
+    """
+    return told(by, STEP[by] * round(value / STEP[by]))
 
 
 def place(region: Region, edges: FloatArray) -> str:

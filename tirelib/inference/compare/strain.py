@@ -8,6 +8,7 @@ import numpy as np
 from scipy import special
 
 from tirelib.core.arrays import BoolArray, FloatArray, IntArray, rms
+from tirelib.core.threads import one_thread
 from tirelib.inference.compare.error import (
     Floor,
     ModelError,
@@ -125,6 +126,7 @@ class Comparison:
         return {name: int(order[place]) for name, place in places.items()}
 
 
+@one_thread()
 def compare_strain(waves: Waveforms, model: TireModel, data_hash: str = "") -> Comparison:
     """Hold a model against measured waveforms.
 

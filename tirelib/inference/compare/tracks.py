@@ -13,6 +13,7 @@ from tirelib.inference.compare.regions import LEAST_SHARE, LEVEL, SLIPS, subsets
 from tirelib.inference.compare.runs import Factor
 from tirelib.inference.compare.sentences import conditions
 from tirelib.inference.identify.random_effects import angle_slope
+from tirelib.measured.features.peaks import peak
 from tirelib.measured.waveforms import GRID, Waveforms
 
 REACH = 0.8
@@ -81,8 +82,9 @@ def contact_edges(strain: FloatArray) -> FloatArray:
     Measurement and model are read in the same way; the contact's own edges differ a little.
     """
     slope = angle_slope(strain)
-    entry = _peak(slope, (GRID < 0.0) & (GRID > -REACH))
-    leaving = _peak(-slope, (GRID > 0.0) & (GRID < REACH))
+    start, step = float(GRID[0]), 2.0 * np.pi / GRID.size
+    entry, _, _ = peak(slope, (GRID < 0.0) & (GRID > -REACH), start, step)
+    leaving, _, _ = peak(-slope, (GRID > 0.0) & (GRID < REACH), start, step)
     return np.stack([entry, leaving], axis=1)
 
 
@@ -133,17 +135,6 @@ def pooled(values: FloatArray, group: IntArray) -> tuple[float, int]:
             square += float(np.sum((part - part.mean()) ** 2))
             freedom += part.size - 1
     return float(np.sqrt(square / freedom)) if freedom else float("nan"), freedom
-
-
-def _peak(values: FloatArray, inside: BoolArray) -> FloatArray:
-    """Return the angle of each row's largest value inside, by a parabola through three samples."""
-    index = np.argmax(np.where(inside, values, -np.inf), axis=1)
-    row = np.arange(len(values))
-    before, top, after = (values[row, (index + k) % GRID.size] for k in (-1, 0, 1))
-    bend = before - 2.0 * top + after
-    shift = np.where(bend < 0.0, 0.5 * (before - after) / np.where(bend < 0.0, bend, -1.0), 0.0)
-    step = GRID[1] - GRID[0]
-    return np.asarray(GRID[index] + np.clip(shift, -0.5, 0.5) * step)
 
 
 @dataclass(frozen=True, slots=True)

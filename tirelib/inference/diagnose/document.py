@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from tirelib.core.arrays import rms
+from tirelib.core.quantities import QUANTITIES
 from tirelib.inference.compare.error import named_errors
-from tirelib.inference.compare.forces import UNITS
 from tirelib.inference.diagnose.assess import Assessed, Assessment, ForceAssessment
 from tirelib.inference.diagnose.guess import Guess
 from tirelib.inference.diagnose.held_out import pooled
@@ -80,17 +81,11 @@ def _force(told: ForceAssessment) -> dict[str, Any]:
     return {
         "campaign": case.name,
         "quantity": case.quantity,
-        "unit": UNITS[case.quantity],
-        "noise": case.noise,
+        "unit": QUANTITIES[case.quantity].unit,
         "repeats": case.repeats,
         "points": len(case.bench.points),
-        "error_unit": case.unit,
-        "error_before": told.before,
+        **case.named_errors(told.before, told.after),
         "error_refitted": found.base.error,
-        "error_after": told.after,
-        "residual_rms_before": told.before / case.factor,
-        "residual_rms_after": told.after / case.factor,
-        "residual_rms_unit": UNITS[case.quantity],
         "steps": [
             {
                 "effect": name,
@@ -149,7 +144,7 @@ def _gages(told: Assessment) -> list[dict[str, float]]:
     return [
         {
             "lateral_mm": 1e3 * runs.waves.header.gage_lateral[gage],
-            "rms_ustrain": 1e6 * float(np.sqrt(np.mean((model - runs.waves.strain[:, gage]) ** 2))),
+            "rms_ustrain": 1e6 * rms(model - runs.waves.strain[:, gage]),
         }
         for gage in runs.gages
     ]

@@ -7,7 +7,6 @@ import numpy as np
 
 from tirelib.core.parameters import TireFile
 from tirelib.inference.compare.error import named_errors
-from tirelib.inference.compare.forces import UNITS
 from tirelib.inference.diagnose.diagnose import strength_told
 from tirelib.inference.diagnose.held_out import NO_POINTS, NO_RUNS
 from tirelib.inference.extend.extension import Extension, ForceExtension
@@ -41,16 +40,17 @@ def extension_document(done: Extension | ForceExtension, file: TireFile) -> dict
         "waterfall": waterfall(file.extra["history"], str(head["quantity"])),
         "held_out": [fold.entry(old, new) for fold, old, new in held_out],
         "effects": list(file.extra["effects"]),
-        "history": [
-            {key: value for key, value in entry.items() if key != "before"}
-            for entry in file.extra["history"]
-        ],
+        "history": told_history(file),
         "messages": messages,
     }
 
 
+def told_history(file: TireFile) -> list[dict[str, Any]]:
+    """Return the history of a model without what was before each entry."""
+    return [{k: v for k, v in entry.items() if k != "before"} for entry in file.extra["history"]]
+
+
 def _strain(done: Extension) -> dict[str, Any]:
-    errors = done.errors
     return {
         "campaign": done.runs.waves.header.name,
         "quantity": "strain",
@@ -59,8 +59,7 @@ def _strain(done: Extension) -> dict[str, Any]:
         "runs": run_errors(done),
         "floor": done.floor,
         "delay_us": 1e6 * done.reached.delay,
-        "heldout_error_before": errors["heldout_error_before"],
-        "heldout_error_after": errors["heldout_error_after"],
+        **done.pooled,
     }
 
 
@@ -69,12 +68,8 @@ def _force(done: ForceExtension) -> dict[str, Any]:
     return {
         "campaign": case.name,
         "quantity": case.quantity,
-        "noise": case.noise,
-        "error_unit": case.unit,
         **errors,
-        "residual_rms_before": errors["error_before"] / case.factor,
-        "residual_rms_after": errors["error_after"] / case.factor,
-        "residual_rms_unit": UNITS[case.quantity],
+        **case.named_errors(errors["error_before"], errors["error_after"]),
     }
 
 

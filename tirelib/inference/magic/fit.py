@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 from scipy.optimize import least_squares
 
-from tirelib.core.arrays import BoolArray, FloatArray
+from tirelib.core.arrays import BoolArray, FloatArray, rms
 from tirelib.core.errors import CalibrationError
 from tirelib.inference.identify.force_data import ForceData
 from tirelib.physics.brush.mf import magic_forces
@@ -349,7 +349,7 @@ def _errors(points: ForceData, tire: MagicTire) -> dict[str, ForceError]:
         if known.any():
             off = (force - measured)[known]
             found[name] = ForceError(
-                float(np.sqrt(np.mean(off**2))),
+                rms(off),
                 float(np.abs(off).max()),
                 float(np.abs(measured[known]).max()),
                 int(known.sum()),

@@ -9,7 +9,6 @@ import numpy as np
 from tirelib.core.quantities import QUANTITIES
 from tirelib.effects import CATALOGUE, Effect
 from tirelib.inference.compare.force_model import ForceModel
-from tirelib.inference.compare.forces import UNITS
 from tirelib.inference.diagnose.diagnose import FALSE_ALARM
 from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.diagnose.forces.models import plain_tires
@@ -66,11 +65,11 @@ def plan_test(
     suspects: Suspects,
     envelope: Envelope | None,
     *,
-    campaign: str = "",
+    campaign: str,
     quantity: str = "strain",
     model: ForceModel | None = None,
     wanted: float = WANTED,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[str], None] | None,
 ) -> Plan:
     """Judge the runs of an envelope for suspects.
 
@@ -125,7 +124,7 @@ def next_test_document(
     hypotheses: Hypotheses,
     catalogue: Mapping[str, Effect],
     *,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[str], None],
 ) -> dict[str, Any]:
     """Return the next test for a diagnosis of strain, as ``tirelib-next-test/1``.
 
@@ -199,7 +198,7 @@ def plan_document(plan: Plan) -> dict[str, Any]:
 def _noise(plan: Plan, test: NextTest) -> dict[str, Any]:
     if plan.quantity == "strain":
         return {"noise_ustrain": {"random": 1e6 * test.random, "structural": 1e6 * test.staying}}
-    unit = UNITS[plan.quantity]
+    unit = QUANTITIES[plan.quantity].unit
     return {"noise": {"random": test.random, "structural": test.staying, "unit": unit}}
 
 

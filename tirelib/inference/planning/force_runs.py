@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tirelib.core.arrays import FloatArray
-from tirelib.inference.compare.force_model import ForceModel
+from tirelib.inference.compare.force_model import ForceModel, slip_of
 from tirelib.inference.diagnose.forces.case import ForceCase
 from tirelib.inference.identify.force_bench import ForceBench
 from tirelib.inference.identify.force_data import ForceData
@@ -19,14 +19,14 @@ from tirelib.inference.problems.force_plan import varies
 def force_axes(case: ForceCase) -> tuple[str, ...]:
     """Return the conditions that a further point of a force may have."""
     at = case.bench.conditions
-    slip = ("slip_ratio",) if case.quantity == "Fx" else ("slip_angle",)
+    slip = slip_of(case.quantity)
     known = [name for name in ("load", "pressure", "speed") if np.isfinite(getattr(at, name)).all()]
     other = [
         name
         for name in ("slip_angle", "slip_ratio", "camber", "temperature")
-        if name not in slip and varies(at, name)
+        if name != slip and varies(at, name)
     ]
-    return (*known, *slip, *other)
+    return (*known, slip, *other)
 
 
 def force_envelope(case: ForceCase, sweep: bool | None = None, **declared: Any) -> Envelope:
@@ -40,8 +40,7 @@ def force_envelope(case: ForceCase, sweep: bool | None = None, **declared: Any) 
         As `Envelope.of`; or the declared range of the slip holds none of the campaign's slips.
     """
     envelope = Envelope.of(case.bench.conditions, force_axes(case), **declared)
-    name = "slip_ratio" if case.quantity == "Fx" else "slip_angle"
-    found = campaign_sweep(case.bench.points, name, sweep)
+    found = campaign_sweep(case.bench.points, slip_of(case.quantity), sweep)
     return envelope if found is None else envelope.swept(found)
 
 

@@ -11,7 +11,7 @@ from tirelib.core.quantities import QUANTITIES
 from tirelib.inference.compare.force_curves import Curve, curves_of, ranked
 from tirelib.inference.compare.force_model import slip_of
 from tirelib.inference.compare.forces import ForceComparison
-from tirelib.inference.compare.sentences import told
+from tirelib.inference.compare.sentences import set_point
 from tirelib.inference.identify.error_bands import levels
 from tirelib.inference.identify.force_points import CELL_ANGLE
 from tirelib.report.figures.compare_plot import (
@@ -68,7 +68,7 @@ def _map(found: ForceComparison) -> Plot:
     if np.isfinite(found.noise):
         unit, factor = "noise", 1.0 / found.noise
     z = factor * cell_means(found.difference, row, column, (y.size, x.size))
-    labels = [told("load", 50.0 * round(float(v) / 50.0)) for v in y]
+    labels = [set_point("load", float(v)) for v in y]
     figure = heat(z, x, slip.label, unit, 220 + 34 * y.size, hoverongaps=False)
     ticks(figure, range(y.size), labels, "load [N]")
     names = [f"load {text}: [{unit}]" for text in labels]

@@ -6,7 +6,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.quantities import QUANTITIES
-from tirelib.inference.compare.sentences import millimetres, told
+from tirelib.inference.compare.sentences import millimetres, set_point, told
 from tirelib.inference.compare.strain import Comparison
 from tirelib.inference.identify.error_bands import levels
 from tirelib.report.figures.compare_plot import (
@@ -130,8 +130,8 @@ def _load_ticks(found: Comparison, order: IntArray) -> tuple[list[float], list[s
             where = np.flatnonzero((level == k) & (straight == counted))
             if where.size and (not places or where.mean() - places[-1] > 0.03 * order.size):
                 places.append(float(where.mean()))
-                mean = 50.0 * round(float(load[order][where].mean()) / 50.0)
-                texts.append(told("load", mean) + ("" if counted else ", slip"))
+                mean = float(load[order][where].mean())
+                texts.append(set_point("load", mean) + ("" if counted else ", slip"))
     return places, texts
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from tirelib.core.arrays import FloatArray, IntArray
 from tirelib.core.quantities import QUANTITIES
+from tirelib.inference.compare.force_model import slip_of
 from tirelib.inference.diagnose.assess import Assessment, ForceAssessment
 from tirelib.inference.diagnose.forces.models import ForceFit
 from tirelib.inference.diagnose.left import Left, left_of
@@ -69,9 +70,8 @@ def _slips(assessment: ForceAssessment, model: ForceFit, title: str) -> Plot:
     """Return the mean of model less measured by slip and by set point of the other conditions."""
     case = assessment.case
     at, unit = case.bench.conditions, case.unit
-    condition = QUANTITIES["slip_ratio" if case.quantity == "Fx" else "slip_angle"]
-    slip = at.slip_ratio if case.quantity == "Fx" else condition.told(at.slip_angle)
-    words = condition.heading
+    condition = slip_of(case.quantity)
+    slip, words = QUANTITIES[condition].told(getattr(at, condition)), QUANTITIES[condition].heading
     edges = np.linspace(slip.min(), slip.max() + 1e-9, _BINS + 1)
     middle, column = 0.5 * (edges[1:] + edges[:-1]), np.digitize(slip, edges) - 1
     labels, group = _rows(assessment)

@@ -2,22 +2,24 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from tirelib.campaign import Campaign
-from tirelib.core.arrays import FloatArray
+from tirelib.core.arrays import FloatArray, rms
 from tirelib.core.errors import CalibrationError
 from tirelib.core.parameters import TireFile
+from tirelib.core.quantities import QUANTITIES
 from tirelib.effects import Effect
 from tirelib.inference.compare.force_model import (
     ForceModel,
     force_model_of,
     quantities_of,
+    slip_of,
     slips,
     usable_points,
 )
-from tirelib.inference.compare.forces import UNITS
 from tirelib.inference.identify.force_bench import ForceBench
 from tirelib.inference.identify.force_data import force_data
 from tirelib.inference.identify.force_noise import force_noise
@@ -62,7 +64,7 @@ class ForceCase:
     @property
     def unit(self) -> str:
         """Unit of errors: noise, N or Nm."""
-        return "noise" if np.isfinite(self.noise) else UNITS[self.quantity]
+        return "noise" if np.isfinite(self.noise) else QUANTITIES[self.quantity].unit
 
     @property
     def factor(self) -> float:
@@ -72,13 +74,13 @@ class ForceCase:
     @property
     def size(self) -> float:
         """Rms of the force at all points, in the unit of errors."""
-        return self.factor * _rms(getattr(self.whole.points.data, self.quantity))
+        return self.factor * rms(getattr(self.whole.points.data, self.quantity))
 
     @property
     def scale(self) -> float:
         """By which residuals of a fit are divided, [N] or [N m]."""
         noise = self.noise if np.isfinite(self.noise) else 0.0
-        misfit = MISFIT * _rms(getattr(self.bench.points.data, self.quantity))
+        misfit = MISFIT * rms(getattr(self.bench.points.data, self.quantity))
         return max(float(np.hypot(misfit, noise)), 1e-9)
 
     def error(
@@ -90,12 +92,24 @@ class ForceCase:
         """Return the error of a brush over all points, in the unit of documents."""
         found = self.whole.forces(values, changes_at(effects, strengths))
         measured = getattr(self.whole.points.data, self.quantity)
-        return self.factor * _rms(measured - getattr(found, self.quantity))
+        return self.factor * rms(measured - getattr(found, self.quantity))
 
     @property
     def given(self) -> float:
         """The error of the model as its file has it."""
         return self.error(self.model.values, self.effects, self.strengths)
+
+    def named_errors(self, before: float, after: float) -> dict[str, Any]:
+        """Return the keys under which a document states the errors before and after a change."""
+        return {
+            "error_unit": self.unit,
+            "noise": self.noise,
+            "error_before": before,
+            "error_after": after,
+            "residual_rms_before": before / self.factor,
+            "residual_rms_after": after / self.factor,
+            "residual_rms_unit": QUANTITIES[self.quantity].unit,
+        }
 
     @property
     def effects(self) -> list[Effect]:
@@ -118,10 +132,6 @@ class ForceCase:
             effects=self.effects,
             strengths=self.strengths,
         )
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def force_case(
@@ -166,7 +176,7 @@ def _case(
             "tell effects apart; add runs with other loads, pressures and slips"
         )
     if not slips(points.data, quantity):
-        slip = "slip ratio" if quantity == "Fx" else "slip angle"
+        slip = slip_of(quantity).replace("_", " ")
         raise CalibrationError(
             f"{name}: one {slip} only, so {quantity} says nothing about the brush; "
             "add runs with slip"
@@ -181,6 +191,6 @@ def _case(
         )
     measured = getattr(whole.data, quantity)
     noise, _, repeats = force_noise(whole, measured)
-    messages += noise_note(quantity, noise, _rms(measured))
+    messages += noise_note(quantity, noise, rms(measured))
     benches = model.bench(points), model.bench(whole)
     return ForceCase(name, model, quantity, *benches, noise, repeats, tuple(messages))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tirelib.core.arrays import FloatArray, IntArray
+from tirelib.core.arrays import FloatArray, IntArray, rms
 from tirelib.core.errors import TirelibError
 from tirelib.effects import Effect
 from tirelib.inference.diagnose.forces.case import ForceCase
@@ -132,7 +132,7 @@ class ForceModels(Models[ForceFit, float]):
         try:
             trained = self._least(self.problem.part(~fold.out, fit.fit.point), fit.effects)
             seen = self.problem.part(fold.out, trained.point)
-            return self.case.factor * float(np.sqrt(np.mean(seen.solve(seen.start).rest ** 2)))
+            return self.case.factor * rms(seen.solve(seen.start).rest)
         except TirelibError:
             return float("nan")
 
@@ -181,5 +181,4 @@ def force_floor(fit: ForceFit, hypothesis: Hypothesis, scale: float, alpha: floa
     rows = np.concatenate(more) / scale
     rows, left = rows - (rows @ basis) @ basis.T, fit.rest / scale
     taken = np.linalg.solve(rows @ rows.T + np.eye(len(rows)), rows @ left) @ rows
-    part = float(np.sqrt(np.mean((left - taken) ** 2) / np.mean(left**2)))
-    return fit.error * min(part, 1.0)
+    return fit.error * min(rms(left - taken) / rms(left), 1.0)
