@@ -79,8 +79,8 @@ def compare(
     campaign : Campaign
     model : TireFile
     quantity : str, optional
-        One of `QUANTITIES`; by default strain where it was measured, else the force that fits
-        worst.
+        One of `QUANTITIES`; by default strain where it was measured and the model has a ring, else
+        the force that fits worst.
     effects : mapping, optional
         Effects by name; the default is the catalogue.
     progress : callable, optional

@@ -19,18 +19,20 @@ from tirelib.measured.waveforms import GRID
 from tirelib.model.base import Coordinate
 
 ANYWHERE = 0.1
-"""Share of the power of an error's smooth shapes that lies anywhere on the turn; the rest lies
-where the effect acts. Half and double of it: docs/theory/verdict_numbers.md."""
+"""What the tire does where the law does nothing lies, with this share of its power, anywhere on the
+turn; the rest lies where the effect acts. Half and double of it: docs/theory/verdict_numbers.md."""
 SHARED = 5.0
 """Size of an error by which another constant of the same part of the tire goes with the effect."""
 PARTS = {"k_u": "sidewall", "k_v": "sidewall", "k_t": "tread"}
 """Stiffnesses of a state, and the part of the tire (`FIELDS`) that they belong to."""
 LARGER, BY_SPEED, PLACED = 1.7, 0.5, 0.4
 """Sizes of an error's parts over that of the law (`tirelib.inference.statistics.law_errors.LAWS`):
-the effect is larger or smaller, goes with speed from place to place, and is displaced. Half and
-double of each: docs/theory/verdict_numbers.md."""
+the effect goes otherwise with conditions, is larger or smaller in a place, or is there where the
+law does nothing; goes with speed in a place; is displaced in a place. Half and double of each:
+docs/theory/verdict_numbers.md."""
 LEAST = 0.05
-"""Part of the effect below which what it does in a place is left out."""
+"""Root mean square of what an effect does in a place, over that of all of it; places below it are
+left out. Other values: docs/theory/verdict_numbers.md."""
 
 LOOKALIKE_SHARE = 0.075
 """How much of what a law does may be an error that looks like any one other effect, beyond these
@@ -40,7 +42,7 @@ parts: a relative standard deviation. Half and double of it: docs/theory/verdict
 def law_errors(
     rows: FloatArray, half_angle: FloatArray, points: Operating, present: int
 ) -> FloatArray:
-    """Return errors of a law, each as large as what the effect does.
+    """Return errors of a law; together they are as large as what the effect does.
 
     The effect goes otherwise with load, pressure, speed and time, by a slope and by a curvature.
     From place to place on the turn it is larger or smaller, always or with load or with speed, and

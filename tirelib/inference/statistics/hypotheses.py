@@ -118,11 +118,12 @@ class Hypotheses:
 
         The error that a law may have can cover what a further effect does. Then nothing stands out
         beside the hypothesis. Where the further effect really acts, the runs are likelier with it,
-        laws roughly right. Any of n effects may be the further one: a likelihood ratio of n / p in
-        favour of one of them has at most the probability p where none is there (Bonferroni, and
-        Royall as in `tirelib.inference.statistics.rival`), with errors of laws of a known size.
-        Something without a name may stand beside either. A larger hypothesis counts only if its
-        strengths are in their ranges and each of its effects is there (`explains`).
+        laws roughly right or exact, whichever is likelier. Any of n effects may be the further one:
+        a likelihood ratio of n / p in favour of one of them has at most the probability p where
+        none is there (Bonferroni, and Royall as in `tirelib.inference.statistics.rival`), with
+        errors of laws of a known size. Something without a name may stand beside either. A larger
+        hypothesis counts only if its strengths are in their ranges and each of its effects is there
+        (`explains`).
         """
         larger = [h for h in self._larger(hypothesis) if h.plausible and self.explains(h)]
         if hypothesis.p <= self.false_alarm or not larger:
@@ -154,7 +155,21 @@ class Hypotheses:
     def _larger(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Return the hypotheses of one effect more that were fitted."""
         names = set(hypothesis.names)
-        return [h for h in self.tried if len(h.names) == len(names) + 1 and names < set(h.names)]
+        return [h for h in self.of_size(len(names) + 1 - len(self.had)) if names < set(h.names)]
+
+    def of_size(self, size: int) -> list[Hypothesis]:
+        """Return the hypotheses of so many further effects that were fitted."""
+        return [h for h in self.tried if len(self.added(h)) == size]
+
+    def without_plain(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """Return the hypothesis of those of its effects that are larger than plain tires show.
+
+        None where no effect is; the given one where fewer effects have no fit.
+        """
+        added, had = self.added(hypothesis), len(self.had)
+        shown = [hypothesis.p_plain(k) for k in range(had, had + len(added))]
+        larger = [name for name, p in zip(added, shown, strict=True) if p <= self.false_alarm]
+        return (self.at(larger, hypothesis) or hypothesis) if larger else None
 
     def _alone(self, place: str, names: Sequence[str], near: Hypothesis) -> Hypothesis | None:
         """Return a hypothesis from a fit nearby; None where no fit settles."""
@@ -188,9 +203,10 @@ class Hypotheses:
         """Return whether each of its effects is there, and not only the error of its law.
 
         Each has to be larger than plain tires show it. And its law has to make the runs likelier
-        without an error, for errors are flexible and would explain something else. That nothing is
-        missing is rejected already. Beside others an effect is one of n that might be there, so
-        that its p-value has to be alpha / n, and its likelihood ratio n / alpha.
+        without an error, for errors are flexible and would explain something else. For a single
+        effect a p-value of alpha and a likelihood ratio of 1 are enough, because it is rejected
+        already that nothing is missing. Beside others an effect is one of n that might be there: it
+        needs alpha / n and n / alpha.
         """
         added, had = self.added(hypothesis), len(self.had)
         shown = max(hypothesis.p_plain(k) for k in range(had, had + len(added)))
@@ -217,8 +233,8 @@ class Hypotheses:
     def supported(self, hypothesis: Hypothesis, odds: float | None = None) -> bool:
         """Return whether its laws, taken as exact, explain the runs better than no effect does.
 
-        Where only the errors of laws make the runs likelier, something else is there. The
-        likelihood ratio has to be n / alpha for each effect, or as it is given.
+        Where only the errors of laws make the runs likelier, something else is there. `odds` is the
+        likelihood ratio that is wanted, by default n / alpha for each effect.
         """
         if odds is None:
             odds = (len(self.effects) / self.false_alarm) ** len(self.added(hypothesis))

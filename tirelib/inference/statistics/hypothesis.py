@@ -59,9 +59,10 @@ class Hypothesis:
         Largest log likelihood where a cause without a name acts as well, [nats]. This cause is more
         of a group of smooth shapes than plain tires have. Laws are roughly right, or exact.
     unnamed_exact : float
-        With exact laws.
+        `unnamed` with exact laws.
     exact_in : tuple of float
-        The same where the law of one effect is exact, for each effect in turn.
+        `unnamed` where the law of one effect is exact, for each effect in turn, the other laws
+        roughly right or exact.
     rival : str
         Effects of a hypothesis of as many effects that is likelier; empty where there is none.
     p_rival : float
@@ -137,8 +138,8 @@ class Hypothesis:
     def p_plain(self, index: int) -> float:
         """Return the p-value of the hypothesis that an effect is as large as plain tires show it.
 
-        By chi-squared of its strength, whose variance is that of the fit with roughly right laws
-        and that of plain tires; the largest over the families.
+        By chi-squared of its strength, whose variance is that of the fit, laws off by `errors`, and
+        that of plain tires; the largest over the families.
         """
         name, place, p = self.names[index], self.fit.place(index), 0.0
         for null in self.nulls:

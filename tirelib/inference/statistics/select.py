@@ -10,10 +10,10 @@ effects explains the runs much better (`tirelib.inference.statistics.rival`), wh
 itself is rejected or not, or where one effect more makes the runs much likelier
 (`Hypotheses.against_larger`), and gives way to fewer of its effects that explain the runs as well
 (`Hypotheses.simpler`). A hypothesis counts only if each of its effects is larger than plain tires
-show it and explains something (`Hypotheses.explains`). Every other hypothesis with p > alpha is in
-the set. Its smallest members are what the data say (Ferrari and Yang 2015): none in it, nothing is
-missing; one smallest member, that is what is missing; several, they cannot be told apart; none at
-all, something unknown is there.
+show it and explains something (`Hypotheses.explains`). The others with p > alpha, of the smallest
+number of effects at which one has it, are what the data say (Ferrari and Yang 2015): the hypothesis
+of no effect, nothing is missing; one, that is what is missing; several, they cannot be told apart;
+none of any number, something unknown is there.
 """
 
 from collections.abc import Callable, Sequence
@@ -115,17 +115,15 @@ def select(
             (leader, _further(leader, hypotheses.effects, SINGLES if size == 1 else PARTNERS))
             for leader in leaders
         ]
-        level = hypotheses.each(
+        hypotheses.each(
             [
                 ((*hypotheses.added(leader), name), leader)
                 for leader, further in tried
                 for name in dict.fromkeys(further + (elsewhere if size == 1 else []))
             ]
         )
-        # two leaders may lead to one and the same set
-        every = sorted(
-            (h for h in dict.fromkeys(level) if h is not None), key=lambda h: -h.likelihood
-        )
+        # those that were fitted to reject fewer effects are among them
+        every = sorted(hypotheses.of_size(size), key=lambda h: -h.likelihood)
         possible = [h for h in every if h.plausible and hypotheses.explains(h)]
         # a rival that is itself rejected is not there, but something like it may be
         fitted = [hypotheses.against(h, possible[0]) for h in possible]
@@ -147,9 +145,10 @@ def select(
             return done("named" if len(members) == 1 else "indistinguishable", members)
         if staying:
             likeliest = max(filter(None, simpler.values()), key=lambda h: h.likelihood)
-            if likeliest is hypotheses.base or not hypotheses.supported(likeliest):
-                return done("unknown", ())
-            return done("form_inadequate", [likeliest])
+            there = likeliest is not hypotheses.base and hypotheses.explains(likeliest)
+            if there and hypotheses.supported(likeliest):
+                return done("form_inadequate", [likeliest])
+            return done("unknown", ())
         # where a hypothesis explains nothing by itself, one of more effects may
         leaders = [h for h in every if h.plausible][:LEADERS]
     leader = leaders[0] if leaders else None
@@ -157,7 +156,7 @@ def select(
         further = _further(leader, hypotheses.effects, 1)
         leader = hypotheses.at((*hypotheses.added(leader), *further), leader) if further else None
     found = many and leader is not None and leader.plausible
-    best = leader if found else _with_loose_laws(hypotheses)
+    best = hypotheses.without_plain(leader) if found and leader else _with_loose_laws(hypotheses)
     if best is not None:
         return done("form_inadequate", [best, *(_alike(hypotheses, best) if many else ())])
     return done("unknown", ())
@@ -170,8 +169,7 @@ def _with_loose_laws(hypotheses: Hypotheses) -> Hypothesis | None:
     there; one that is out of its range is not told.
     """
     for size in range(1, MOST_EFFECTS + 1):
-        same = [h for h in hypotheses.tried if len(hypotheses.added(h)) == size]
-        loose = [h for h in same if 1.0 < h.looseness < np.inf]
+        loose = [h for h in hypotheses.of_size(size) if 1.0 < h.looseness < np.inf]
         loose = [h for h in loose if hypotheses.supported(h) and hypotheses.explains(h)]
         best = max(loose, key=lambda h: h.likelihood, default=None)
         if best is not None and best.plausible:

@@ -172,6 +172,15 @@ def test_one_effect_more_has_to_be_likelier_than_something_without_a_name(share:
     assert bool(among.against_larger(alone).rival) is (share > 1.0)
 
 
+def test_one_effect_more_is_not_there_if_its_exact_law_explains_nothing() -> None:
+    among = Hypotheses(planted(3, twist=1.0, bend=COVERED), FAMILIES)
+    alone, both = twist_and_bend(among)
+    assert among.against_larger(alone).rival
+    nothing = replace(both, unnamed_exact=alone.unnamed_exact, exact_in=(alone.unnamed,) * 2)
+    among._made[frozenset(both.names)] = nothing
+    assert among.against_larger(alone) is alone
+
+
 def test_one_effect_more_is_not_there_if_it_is_out_of_its_range() -> None:
     among = Hypotheses(planted(3, twist=1.0, bend=COVERED), FAMILIES)
     alone, both = twist_and_bend(among)

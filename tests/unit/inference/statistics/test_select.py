@@ -231,6 +231,23 @@ def test_where_no_law_is_right_effects_that_are_all_larger_than_on_plain_tires_a
     assert [set(names) for names in found.sets] == [{"bend", "twist"}] * (kind != "unknown")
 
 
+@pytest.mark.parametrize(("bend", "sets"), [(0.6, (("bend",),)), (0.0, ())])
+def test_of_many_effects_whose_laws_are_all_wrong_those_that_plain_tires_show_are_not_told(
+    monkeypatch: pytest.MonkeyPatch, bend: float, sets: tuple[tuple[str, ...], ...]
+) -> None:
+    tested = Hypotheses._tested
+
+    def rejected(self: Hypotheses, problem: Any, fit: Posterior) -> Hypothesis:
+        """Return a hypothesis as one that is rejected, all effects only unless laws are loose."""
+        h = tested(self, problem, fit)
+        return replace(h, p_rival=0.0, looseness=10.0 / 3.0 if len(fit.effects) == 3 else np.inf)
+
+    monkeypatch.setattr(Hypotheses, "_tested", rejected)
+    found = select(Toy(drawn(np.random.default_rng(2), bend=bend)), FAMILIES, many=True)
+    assert found.kind == ("form_inadequate" if sets else "unknown")
+    assert found.sets == sets
+
+
 @pytest.mark.parametrize(("least", "kind"), [(1, "unknown"), (2, "form_inadequate")])
 def test_more_effects_that_are_not_likelier_do_not_show_that_they_are_there(
     monkeypatch: pytest.MonkeyPatch, least: int, kind: str
