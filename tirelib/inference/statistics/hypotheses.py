@@ -117,13 +117,13 @@ class Hypotheses:
         """Return a hypothesis that is not rejected with its p-value against one effect more.
 
         The error that a law may have can cover what a further effect does. Then nothing stands out
-        beside the hypothesis. Where the further effect really acts, the runs are likelier with it,
-        laws roughly right or exact, whichever is likelier. Any of n effects may be the further one:
-        a likelihood ratio of n / p in favour of one of them has at most the probability p where
-        none is there (Bonferroni, and Royall as in `tirelib.inference.statistics.rival`), with
-        errors of laws of a known size. Something without a name may stand beside either. A larger
-        hypothesis counts only if its strengths are in their ranges and each of its effects is there
-        (`explains`).
+        beside the hypothesis. If the further effect really acts, the runs are still likelier with
+        it than without; laws are roughly right or exact in each of the two, whichever makes the
+        runs likelier. Any of n effects may be the further one: a likelihood ratio of n / p in
+        favour of one of them has at most the probability p where none is there (Bonferroni, and
+        Royall as in `tirelib.inference.statistics.rival`), with errors of laws of a known size.
+        Something without a name may stand beside either. A larger hypothesis counts only if its
+        strengths are in their ranges and each of its effects is there (`explains`).
         """
         larger = [h for h in self._larger(hypothesis) if h.plausible and self.explains(h)]
         if hypothesis.p <= self.false_alarm or not larger:

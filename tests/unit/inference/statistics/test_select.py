@@ -214,18 +214,23 @@ def test_a_law_that_is_a_definition_has_no_error() -> None:
     assert named[True] == ()  # it may not be off, and nothing else explains what it leaves
 
 
+def reject_all(monkeypatch: pytest.MonkeyPatch, *, unless_loose: int) -> None:
+    """Reject every hypothesis, one of so many effects only unless its laws are loose."""
+    tested = Hypotheses._tested
+
+    def rejected(self: Hypotheses, problem: Any, fit: Posterior) -> Hypothesis:
+        h = tested(self, problem, fit)
+        loose = len(fit.effects) == unless_loose
+        return replace(h, p_rival=0.0, looseness=10.0 / 3.0 if loose else np.inf)
+
+    monkeypatch.setattr(Hypotheses, "_tested", rejected)
+
+
 @pytest.mark.parametrize(("twist", "kind"), [(0.0, "unknown"), (0.6, "form_inadequate")])
 def test_where_no_law_is_right_effects_that_are_all_larger_than_on_plain_tires_are_named(
     monkeypatch: pytest.MonkeyPatch, twist: float, kind: str
 ) -> None:
-    tested = Hypotheses._tested
-
-    def loose(self: Hypotheses, problem: Any, fit: Posterior) -> Hypothesis:
-        """Return a hypothesis as one that is rejected, a pair only unless its laws are loose."""
-        h = tested(self, problem, fit)
-        return replace(h, p_rival=0.0, looseness=10.0 / 3.0 if len(fit.effects) == 2 else np.inf)
-
-    monkeypatch.setattr(Hypotheses, "_tested", loose)
+    reject_all(monkeypatch, unless_loose=2)
     found = select(Toy(drawn(np.random.default_rng(2), bend=0.6, twist=twist)), FAMILIES)
     assert found.kind == kind
     assert [set(names) for names in found.sets] == [{"bend", "twist"}] * (kind != "unknown")
@@ -235,14 +240,7 @@ def test_where_no_law_is_right_effects_that_are_all_larger_than_on_plain_tires_a
 def test_of_many_effects_whose_laws_are_all_wrong_those_that_plain_tires_show_are_not_told(
     monkeypatch: pytest.MonkeyPatch, bend: float, sets: tuple[tuple[str, ...], ...]
 ) -> None:
-    tested = Hypotheses._tested
-
-    def rejected(self: Hypotheses, problem: Any, fit: Posterior) -> Hypothesis:
-        """Return a hypothesis as one that is rejected, all effects only unless laws are loose."""
-        h = tested(self, problem, fit)
-        return replace(h, p_rival=0.0, looseness=10.0 / 3.0 if len(fit.effects) == 3 else np.inf)
-
-    monkeypatch.setattr(Hypotheses, "_tested", rejected)
+    reject_all(monkeypatch, unless_loose=3)
     found = select(Toy(drawn(np.random.default_rng(2), bend=bend)), FAMILIES, many=True)
     assert found.kind == ("form_inadequate" if sets else "unknown")
     assert found.sets == sets
